@@ -17,10 +17,10 @@ EXAMPLES := $(wildcard examples/*.py)
 GALLERY := docs/gallery/pictures
 PICTURES := $(EXAMPLES:examples/%.py=$(GALLERY)/%.png)
 
-.PHONY: demo install wheels test test-core test-rest test-beside test-step test-lerobot test-slow mutants figures reproduced bench docs gallery lint clean
+.PHONY: demo install wheels test test-core test-rest test-beside test-step test-lerobot test-slow mutants figures reproduced bench docs gallery world-pictures lint clean
 
 demo: install
-	$(BIN)/skillframe quickstart --out $(OUT)
+	$(BIN)/skillframe demo --out $(OUT)
 
 install: $(VENV)/.installed
 
@@ -50,9 +50,9 @@ $(VENV)/.dev: $(VENV)/.test
 
 test: test-core test-rest
 
-# The core on its own: no plug-in is loaded.
+# The core with the worlds, and no other plug-in.
 test-core: $(VENV)/.test
-	SKILLFRAME_PLUGINS= $(PYTEST) $(SIDE_BY_SIDE) -m "core and not slow and not figures" tests/unit
+	SKILLFRAME_PLUGINS=worlds $(PYTEST) $(SIDE_BY_SIDE) -m "core and not slow and not figures" tests/unit
 
 # Everything else, with all plug-ins.
 test-rest: $(VENV)/.test
@@ -65,13 +65,13 @@ test-beside: $(VENV)/.test
 # What reads STEP, whose library is 99 MB and not among the others.
 test-step: $(VENV)/.test
 	$(PIP) install -e '.[step]'
-	$(PYTEST) tests/unit/parts/test_step.py
+	$(PYTEST) plugins/parts/tests/test_step.py
 
 # What runs inside LeRobot. It brings gigabytes and holds libraries back, so it has an environment of its own, and CI does
 # not run it.
 $(LEROBOT)/.installed: plugins/lerobot/pyproject.toml
 	$(PYTHON) -m venv --clear $(LEROBOT)
-	$(LEROBOT)/bin/python -m pip install --quiet -e '.[sim]' -e plugins/lmc -e plugins/gym -e plugins/lerobot \
+	$(LEROBOT)/bin/python -m pip install --quiet -e '.[sim]' -e plugins/lmc -e plugins/reports -e plugins/gym -e plugins/lerobot \
 	  pytest pytest-timeout hypothesis
 	@touch $@
 
@@ -83,7 +83,7 @@ test-slow: $(VENV)/.test
 
 # Single changes of the core mathematics: does the everyday test that is named beside each notice it?
 mutants: $(VENV)/.test
-	$(BIN)/python -m tests.mutants.run --jobs 2 --page docs/evidence/mutants.md
+	$(BIN)/python -m tests.mutants.run --jobs 2 --results tests/mutants/caught.csv
 
 figures: $(VENV)/.test
 	$(PYTEST) -s -m figures
@@ -105,6 +105,10 @@ gallery: $(VENV)/.dev
 	@for script in $(EXAMPLES); do echo $$script; MPLBACKEND=Agg $(BIN)/python $$script --out $(GALLERY) \
 	  > $(GALLERY)/$$(basename $$script .py).txt || exit 1; done
 
+# The pictures of the shipped worlds on the page docs/reference/worlds.md.
+world-pictures: $(VENV)/.dev
+	SKILLFRAME_PLUGINS=worlds,reports $(BIN)/skillframe worlds --pictures docs/images/worlds
+
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -113,7 +117,7 @@ lint: $(VENV)/.dev
 clean:
 	rm -rf $(VENV) $(LEROBOT) build dist docs/_build docs/gallery
 
-# The papers' results, computed again and put into the committed tables and the page of the docs. `make reproduced
+# The papers' results, computed again and put into the committed tables. `make reproduced
 # ROWS="3 5"` does some of them, QUICK=--quick the quick ones. A verdict that changes is told, and is no error here.
 ROWS ?=
 QUICK ?=

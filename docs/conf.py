@@ -23,6 +23,7 @@ extensions = [
     "docstring_maths",
     "command_help",
     "gallery",
+    "generated",
 ]
 exclude_patterns = ["_build", "_extensions", "_static"]
 myst_enable_extensions = ["dollarmath", "deflist"]

@@ -13,6 +13,7 @@ import numpy as np
 
 from skillframe import Campaign, learn, record
 
+ABOVE = {"start.offset_z": "2mm"}  # the most tilted hole: a start inside the fixture is no trial
 VARY = {"fixture.offset_x": {"uniform": [-0.008, 0.008]}, "fixture.tilt_y": {"uniform": [-0.12, 0.12]}}
 
 
@@ -25,7 +26,7 @@ def main(out: Path, quick: bool) -> None:
         "DMP": learn(demonstrations, "dmp"),
     }
     campaign = Campaign(
-        world="peg_in_hole", robot="free_tool", coc="tip", duration_s=8.0, skills=skills, vary=VARY,
+        world="peg_in_hole", robot="free_tool", coc="tip", duration_s=8.0, skills=skills, vary=VARY, set=ABOVE,
         trials=8 if quick else 100, seed=5,
     )  # fmt: skip
     results = campaign.run(traces=0)
@@ -45,7 +46,7 @@ def main(out: Path, quick: bool) -> None:
     )
     forces = [results.table(name)["peak_force_n"] for name in skills]
     right.boxplot(forces, tick_labels=list(skills), showfliers=False)
-    right.set(ylabel="peak contact force in the simulator [N]", title="how hard they push")
+    right.set(ylabel="peak contact force in simulation [N]", title="how hard they push")
     for ax in (left, right):
         ax.spines[["top", "right"]].set_visible(False)
     figure.savefig(out / "compare.png", dpi=110)

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+from skillframe_teaching.teacher import TeacherSettings
 
 from skillframe import learn, record, run
-from skillframe.teaching.teacher import TeacherSettings
 
 REMOTE = TeacherSettings(kind="teleoperation", delay_s=0.02)
 

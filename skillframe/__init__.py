@@ -19,7 +19,7 @@ Importing the package loads none of the scientific libraries.
 
 from typing import TYPE_CHECKING, Any
 
-from skillframe import doors, paths
+from skillframe import files
 
 __version__ = "0.2.0"
 
@@ -32,7 +32,7 @@ _PUBLIC = {
     "LearnedSkill": "skillframe.api.learning",
     "Observation": "skillframe.skill",
     "Pose": "skillframe.frames",
-    "Recording": "skillframe.teaching.sessions",
+    "Recording": "skillframe.extend.reading",
     "SingleRun": "skillframe.api.running",
     "Skill": "skillframe.skill",
     "SkillframeError": "skillframe.errors",
@@ -65,6 +65,7 @@ if TYPE_CHECKING:
     from skillframe.errors import SkillframeError as SkillframeError
     from skillframe.errors import SkillframeWarning as SkillframeWarning
     from skillframe.extend.hookspecs import hookimpl as hookimpl
+    from skillframe.extend.reading import Recording as Recording
     from skillframe.frames import Pose as Pose
     from skillframe.skill import Command as Command
     from skillframe.skill import Impedance as Impedance
@@ -72,11 +73,10 @@ if TYPE_CHECKING:
     from skillframe.skill import Skill as Skill
     from skillframe.skill import Status as Status
     from skillframe.skill import per_trial as per_trial
-    from skillframe.teaching.sessions import Recording as Recording
 
 
 def __getattr__(name: str) -> Any:
-    """Load a public name on first use, so that `import skillframe` stays instant."""
+    """Load a public name on first use, so that `import skillframe` stays fast."""
     if name not in _PUBLIC:
         raise AttributeError(f"module 'skillframe' has no attribute {name!r}")
     from importlib import import_module
@@ -88,10 +88,15 @@ def __getattr__(name: str) -> Any:
 
 
 def _robots_of_plugins(name: str | None = None) -> "Mapping[str, Path]":
-    """Folders of registered robots. The registry is loaded when a robot is asked for that is not shipped."""
-    from skillframe.extend.robots import folders
+    from skillframe.extend.registry import robot_folders
 
-    return folders(name)
+    return robot_folders(name)
+
+
+def _tables_of_plugins(values: "dict[str, Any]", path: "Path") -> "dict[str, Any]":
+    from skillframe.extend.drives import written_out
+
+    return written_out(values, path)
 
 
 def __dir__() -> list[str]:
@@ -99,5 +104,5 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *_PUBLIC})
 
 
-doors.install()
-paths.OFFERS["robots"] = _robots_of_plugins
+files.OFFERS["robots"] = _robots_of_plugins
+files.WRITES_OUT.append(_tables_of_plugins)

@@ -1,7 +1,7 @@
-"""Exceptions: one base class, and leaves that carry facts and format one sentence a person can act on.
+"""Exceptions: one base class, and subclasses that carry facts and format one sentence.
 
-`SkillframeError` is everything a user can fix (exit code 2); `RunStopped` and its kind are answers, not errors, and
-live with the executor. An error's text says what is wrong, where, and what to do.
+`SkillframeError` is everything that a user can fix (exit code 2); `RunStopped` and its kind are outcomes, not errors,
+and live with the executor. An error's text says what is wrong, where, and what to do.
 """
 
 from __future__ import annotations
@@ -11,42 +11,42 @@ from contextlib import contextmanager
 from importlib.util import find_spec
 
 MOST_NAMES = 30
-"""Names that an error lists; more are no sentence any more."""
-LEAST_LIKENESS = 0.5
-"""Share of letters in common (Ratcliff and Obershelp) from which on a name is suggested."""
+"""Most names that an error lists."""
 EXTRAS: Mapping[str, str] = {
     "sim": "simulating robots and worlds",
     "cluster": "a campaign with worker processes",
-    "video": "writing a video",
-    "ros": "reading a ROS bag, or writing one",
-    "hdf5": "reading an HDF5 file",
-    "parquet": "reading a parquet file or a LeRobot data set",
+    "skillframe-recordings[ros]": "reading a ROS bag, or writing one",
+    "skillframe-recordings[hdf5]": "reading an HDF5 file",
+    "skillframe-recordings[parquet]": "reading a parquet file or a LeRobot data set",
     "fmu": "an FMU",
-    "crane": "a hydraulic machine",
+    "crane": "a robot with closed chains",
     "parts": "a world of mesh files",
     "step": "a part drawn as STEP",
+    "collada": "a robot's meshes in COLLADA (.dae)",
+    "skillframe-reports[video]": "writing a video",
 }
-"""What each extra of the distribution is for; pyproject.toml says what it installs."""
+"""Purpose of each extra of the core, and of extras of other distributions that the core names in full."""
 LIBRARIES: Mapping[str, tuple[str, str]] = {
     "mujoco": ("mujoco", "sim"),
     "pinocchio": ("pin", "sim"),
     "distributed": ("distributed", "cluster"),
     "dask": ("distributed", "cluster"),
     "cryptography": ("cryptography", "cluster"),
-    "av": ("av", "video"),
-    "PIL": ("pillow", "video"),
-    "rosbags": ("rosbags", "ros"),
-    "mcap": ("mcap", "ros"),
-    "h5py": ("h5py", "hdf5"),
-    "pyarrow": ("pyarrow", "parquet"),
+    "av": ("av", "skillframe-reports[video]"),
+    "PIL": ("pillow", "skillframe-reports[video]"),
+    "rosbags": ("rosbags", "skillframe-recordings[ros]"),
+    "mcap": ("mcap", "skillframe-recordings[ros]"),
+    "h5py": ("h5py", "skillframe-recordings[hdf5]"),
+    "pyarrow": ("pyarrow", "skillframe-recordings[parquet]"),
     "fmpy": ("fmpy", "fmu"),
     "lxml": ("lxml", "fmu"),
     "casadi": ("casadi", "crane"),
     "trimesh": ("trimesh", "parts"),
     "manifold3d": ("manifold3d", "parts"),
     "cascadio": ("cascadio", "step"),
+    "collada": ("pycollada", "collada"),
 }
-"""By module: the distribution that it comes from, and the first extra that installs that."""
+"""By module: its distribution, and the first extra that installs it."""
 
 
 class SkillframeError(Exception):
@@ -68,13 +68,13 @@ class InputError(SkillframeError):
 
 
 class UnknownName(SkillframeError):
-    """Nothing is registered under a name. The text lists what there is and suggests the nearest.
+    """Nothing is registered under a name. The text lists the known names and suggests the nearest.
 
     Attributes:
         kind: what was looked for ("world", "skill", "key" ...).
-        name: the name that was asked for.
+        name: the unknown name.
         known: the names that exist.
-        note: why a name that a person has in mind may not be there.
+        note: why an expected name may be absent.
     """
 
     def __init__(self, kind: str, name: str, known: Iterable[str], note: str = "", where: str = "") -> None:
@@ -83,13 +83,16 @@ class UnknownName(SkillframeError):
         text = f"{where}: " if where else ""
         text += f"unknown {kind} {name!r}"
         text += f"; did you mean {near!r}?" if near else ""
-        some = self.known if len(self.known) <= MOST_NAMES else [*self.known[:MOST_NAMES], "..."]
+        some = self.known
+        if len(some) > MOST_NAMES:
+            groups = sorted({f"{group}.*" if dot else each for each in some for group, dot, _ in [each.partition(".")]})
+            some = groups if 2 * len(groups) <= len(some) else [*some[:MOST_NAMES], "..."]
         text += f" (there are: {', '.join(some) or 'none'})"
         super().__init__(text + (f"; {note}" if note else ""))
 
 
 class MissingDependency(SkillframeError):
-    """An optional library is needed for this. The text has the command that installs it."""
+    """An optional library is missing. The text has the command that installs it."""
 
     def __init__(self, library: str, purpose: str, command: str) -> None:
         self.library, self.purpose, self.command = library, purpose, command
@@ -97,15 +100,16 @@ class MissingDependency(SkillframeError):
 
 
 def missing_extra(module: str) -> MissingDependency | None:
-    """What is said where a module cannot be imported because an extra is not installed. None for any other module."""
+    """The error for a module of an extra that is not installed. None for any other module."""
     if module.partition(".")[0] not in LIBRARIES:
         return None
     library, extra = LIBRARIES[module.partition(".")[0]]
-    return MissingDependency(library, EXTRAS[extra], f"pip install 'skillframe[{extra}]'")
+    requirement = extra if "[" in extra else f"skillframe[{extra}]"
+    return MissingDependency(library, EXTRAS[extra], f"pip install '{requirement}'")
 
 
 def need(module: str) -> None:
-    """Find out before any work is done for it whether a module of an extra is installed.
+    """Check, before the work, that a module of an extra is installed.
 
     Raises:
         MissingDependency: it is not.
@@ -117,7 +121,7 @@ def need(module: str) -> None:
 
 @contextmanager
 def extras_named() -> Iterator[None]:
-    """Within this, an extra that is not installed is a sentence that names the line to type.
+    """While open, an extra that is not installed is reported with the command that installs it.
 
     Raises:
         MissingDependency: in place of `ModuleNotFoundError` for a library of an extra.
@@ -132,17 +136,17 @@ def extras_named() -> Iterator[None]:
 
 
 class SkillframeWarning(UserWarning):
-    """Something that looks wrong and may be right: a biased recording, a bare number that reads like millimetres."""
+    """Something suspicious that may be right: a biased recording, a bare number that looks like millimetres."""
 
 
 def suggest(name: str, known: Iterable[str]) -> str | None:
-    """Nearest of the known names, or None if none is near. A name can be near as a whole or by its beginning."""
+    """Nearest of the known names, by the whole name or its beginning, or None."""
     from difflib import SequenceMatcher
 
     def likeness(other: str) -> tuple[float, float, str]:
         texts = (other, other[: len(name)])
         whole, beginning = (SequenceMatcher(None, text.lower(), name.lower()).ratio() for text in texts)
-        return max(whole, beginning), whole, other  # of equals the last, whatever the order of `known`
+        return max(whole, beginning), whole, other  # of equals the last in the alphabet
 
     near = max(known, key=likeness, default=None)
-    return near if near is not None and likeness(near)[0] >= LEAST_LIKENESS else None
+    return near if near is not None and likeness(near)[0] >= 0.5 else None

@@ -2,8 +2,8 @@ r"""Rotations, poses and wrenches over arrays with any leading dimensions.
 
 Conventions, used everywhere: SI units; quaternions x, y, z, w; spatial vectors linear part first; a pose maps tool
 coordinates to base, \(x_{base} = R\,x_{tool} + p\); a wrench is what the environment exerts on the tool, taken at a
-point and expressed in base axes. Everything here is plain numpy, because a one-off scipy `Rotation` costs 50-70 us and
-`np.cross` 16 us, more than a whole control law.
+point and expressed in base axes. All is plain numpy, since a scipy `Rotation` costs 50-70 us and `np.cross` 16 us, more
+than a whole control law.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Pose(NamedTuple):
     rotation: Float
 
     def at(self, offset: Float) -> Pose:
-        """The pose of a point fixed in this frame: same attitude, origin moved by `offset` (..., 3) in frame axes."""
+        """The pose of a point fixed in this frame: origin moved by `offset` (..., 3) in frame axes."""
         return Pose(self.position + rotate(self.rotation, offset), self.rotation)
 
     def compose(self, other: Pose) -> Pose:
@@ -53,7 +53,7 @@ def rotate(rotation: Float, vector: Float) -> Float:
 
 
 def cross(a: Float, b: Float) -> Float:
-    """Cross product of (..., 3) arrays. Ten times faster than `np.cross` on small ones."""
+    """Cross product of (..., 3) arrays, ten times faster than `np.cross` on small ones."""
     result: Float = a.take(_NEXT, -1) * b.take(_AFTER, -1) - a.take(_AFTER, -1) * b.take(_NEXT, -1)
     return result
 
@@ -65,14 +65,24 @@ def skew(v: Float) -> Float:
     return result.reshape(*v.shape[:-1], 3, 3)
 
 
+def dot(a: Float, b: Float) -> Float:
+    """Scalar products over the last axis, summed in order.
+
+    `np.vecdot` uses BLAS, whose rounding depends on processor and memory alignment, so that a trial would not be
+    bit-identical in another batch.
+    """
+    result: Float = np.add.reduce(a * b, axis=-1)
+    return result
+
+
 def norm(v: Float) -> Float:
     """Euclidean norm over the last axis."""
-    result: Float = np.sqrt(np.vecdot(v, v))
+    result: Float = np.sqrt(dot(v, v))
     return result
 
 
 def unit(v: Float) -> Float:
-    """Unit vectors over the last axis. A zero vector stays zero."""
+    """Unit vectors over the last axis, zero for zero."""
     length = norm(v)[..., None]
     result: Float = v / np.where(length > 0.0, length, 1.0)
     return result
@@ -81,7 +91,7 @@ def unit(v: Float) -> Float:
 def rotation_vector(rotation: Float) -> Float:
     """Logarithm of rotation matrices (..., 3, 3) as rotation vectors (..., 3), angle in [0, pi].
 
-    Stable near 0 and near pi, where the axis is read from the symmetric part.
+    Stable near 0 and near pi, where the axis is taken from the symmetric part.
     """
     flat = rotation.reshape(*rotation.shape[:-2], 9)
     w: Float = 0.5 * (flat.take(_LOWER, -1) - flat.take(_UPPER, -1))
@@ -112,7 +122,7 @@ _UPRIGHT = np.eye(3)
 def rotation_matrix(vector: ArrayLike) -> Float:
     """Exponential of rotation vectors (..., 3): Rodrigues' formula, exact to rounding for every angle."""
     v = np.asarray(vector, dtype=float)
-    if not np.count_nonzero(v):  # what does not turn, which is most of what is asked in a tick
+    if not np.count_nonzero(v):  # no rotation, the most frequent case in the loop
         still = np.empty((*v.shape[:-1], 3, 3))
         still[...] = _UPRIGHT
         return still
@@ -144,12 +154,12 @@ def matrix_from_quaternion(quaternion: ArrayLike) -> Float:
     return result
 
 
-# where the off-diagonal elements of 4 q q^T are in a flat rotation matrix; its diagonal is computed apart
+# indices of the off-diagonal elements of 4 q q^T in a flat rotation matrix
 _FIRST = np.array([0, 1, 2, 7, 1, 0, 5, 2, 2, 5, 0, 3, 7, 2, 3, 0])
 _SECOND = np.array([0, 3, 6, 5, 3, 0, 7, 6, 6, 7, 0, 1, 5, 6, 1, 0])
 _SIGN = np.array([1.0, 1, 1, -1, 1, 1, 1, -1, 1, 1, 1, -1, -1, -1, -1, 1])
 _FEW = 36
-"""Numbers up to which Python's own are faster than arrays: four matrices."""
+"""Size up to which Python numbers are faster than arrays: four matrices."""
 
 
 def quaternion_from_matrix(rotation: ArrayLike) -> Float:
@@ -167,9 +177,9 @@ def quaternion_from_matrix(rotation: ArrayLike) -> Float:
 def _line_of_quaternion(
     xx: float, xy: float, xz: float, yx: float, yy: float, yz: float, zx: float, zy: float, zz: float
 ) -> tuple[float, float, float, float] | None:
-    """The best conditioned row of 4 q q^T, or None where it is not finite. As `_quaternions` has it, to the bit."""
+    """The best conditioned row of 4 q q^T, or None if not finite. Bit-identical to `_quaternions`."""
     trace = xx + yy + zz
-    if trace - trace != 0.0:  # not a number, or infinite
+    if trace - trace != 0.0:  # NaN or infinite
         return None
     largest = max(xx, yy, zz, trace)
     if xx == largest:
@@ -182,21 +192,29 @@ def _line_of_quaternion(
 
 
 def _quaternions(r: Float, flat: Float) -> Float:
-    """`quaternion_from_matrix` for many, and for what is not finite."""
+    """`quaternion_from_matrix` for many matrices, and for those that are not finite."""
     main = flat[..., ::4]
     trace = (main[..., 0] + main[..., 1] + main[..., 2])[..., None]
     outer = flat.take(_FIRST, axis=-1) + _SIGN * flat.take(_SECOND, axis=-1)  # 4 q q^T, row by row
     outer[..., :15:5] = 1.0 + 2.0 * main - trace
     outer[..., 15:] = 1.0 + trace
-    best = np.argmax(np.concatenate([main, trace], axis=-1), axis=-1)  # its row is best conditioned
+    best = np.argmax(np.concatenate([main, trace], axis=-1), axis=-1)  # the best conditioned row
     rows = outer.reshape(-1, 4, 4)
     q = unit(rows[np.arange(len(rows)), best.ravel()]).reshape(*r.shape[:-2], 4)
     result: Float = np.where(q[..., 3:] < 0.0, -q, q)
     return result
 
 
+def continuous(quaternion: Float) -> Float:
+    """Quaternions (T, ..., 4) with the sign of each that is nearer to the one before."""
+    flips = np.where((quaternion[1:] * quaternion[:-1]).sum(axis=-1) < 0.0, -1.0, 1.0)
+    signs = np.concatenate([np.ones((1, *flips.shape[1:])), np.cumprod(flips, axis=0)])
+    result: Float = quaternion * signs[..., None]
+    return result
+
+
 def move_wrench(wrench: Float, shift: Float) -> Float:
-    """Wrench (..., 6) taken at another point, same axes: T' = T - shift x F.
+    """Wrench (..., 6) at another point, same axes: T' = T - shift x F.
 
     Args:
         wrench: (..., 6) force then torque.
@@ -226,3 +244,19 @@ def rotate_spatial(rotation: Float, vector: Float) -> Float:
     halves = vector.reshape(*vector.shape[:-1], 2, 3) @ np.swapaxes(rotation, -1, -2)
     result: Float = halves.reshape(*halves.shape[:-2], 6)
     return result
+
+
+def slerp(clock: Float, quaternion: Float, time: Float) -> Float:
+    """Quaternions (T', 4) at `time` (T',), interpolated along the shortest rotation between samples (T, 4)."""
+    left = np.clip(np.searchsorted(clock, time, side="right") - 1, 0, len(clock) - 2)
+    share = ((time - clock[left]) / (clock[left + 1] - clock[left]))[:, None]
+    rotation = matrix_from_quaternion(quaternion)
+    first = rotation[left]
+    turn = rotation_vector(np.swapaxes(first, -1, -2) @ rotation[left + 1])
+    return quaternion_from_matrix(first @ rotation_matrix(share * turn))
+
+
+def pose_error(desired: Pose, measured: Pose) -> Float:
+    """Desired minus measured pose (N, 6): position [m], then the rotation vector of R_d R^T [rad], in base axes."""
+    turn = desired.rotation @ np.swapaxes(measured.rotation, -1, -2)
+    return np.concatenate([desired.position - measured.position, rotation_vector(turn)], axis=-1)

@@ -1,16 +1,15 @@
-"""What passes between loop and skill: observations that a skill cannot reach back through, commands that are checked.
+"""The interface between loop and skill: read-only observations, and checked commands.
 
-A skill is handed copies that it cannot write to, so that nothing it does changes what limits, controller and recorder
-read. What it hands back is looked at before it is used:
+A skill gets read-only copies, so that it cannot change what limits, controller and recorder read. Its commands are
+checked before use:
 
-- a wrong type or shape, which is the whole batch's, is the skill's defect: `SkillframeError` with its field;
-- a row that is no command ends that trial, with words: a rotation that is none, a stiffness that is not symmetric and
-  positive semi-definite, a damping that feeds energy in, a status that is none of `Status`, a reason that is no text.
-  What is not finite makes the law not finite, which the limits end as diverged.
+- a wrong type or shape is a defect of the skill: `SkillframeError` with the field;
+- an invalid row ends its trial with a reason: an invalid rotation, a stiffness that is not symmetric and positive
+  semi-definite, a damping that adds energy, an unknown status, a reason that is no text. Values that are not finite
+  make the controller's output not finite, which the limits end as diverged.
 
-Rotations are looked at in every tick unless the very same array comes again; an impedance is built once per phase and
-shared, so it is looked at when another array comes. What a skill changes in place in an array it hands back again is
-found within `SLOW_TICKS`, and a rotation that mirrors within `RARE_TICKS`.
+Rotations are checked in every tick unless the same array comes again; an impedance, built once per phase, is checked
+when another array comes. Changes in place are found within `SLOW_TICKS`, and a mirroring rotation within `RARE_TICKS`.
 """
 
 from __future__ import annotations
@@ -26,33 +25,31 @@ from skillframe.frames import Float, Pose
 from skillframe.skill import Command, Impedance, Observation, Skill, Status
 
 SLOW_TICKS = 10
-"""Every 10 ms at 1 kHz: how often goals and what changes slowly are looked at."""
+"""Ticks between checks of goals and of slow changes: 10 ms at 1 kHz."""
 RARE_TICKS = 100
-"""Every 100 ms: kinds of numbers, and whether a rotation is none because it mirrors."""
+"""Ticks between checks of dtypes and of mirroring rotations: 100 ms at 1 kHz."""
 ROTATION_SLACK = 1e-3
-"""Largest entry of R^T R - 1 (ours): far above the rounding of an hour's products, or of single precision."""
-IMPEDANCE_SLACK = 1e-6
-"""Of a stiffness' largest entry: how far it may be from symmetric, and its eigenvalues below zero (ours)."""
+"""Largest entry of R^T R - 1: far above the rounding of an hour's products, or of single precision."""
 Answer = TypeVar("Answer")
 _EYE = np.eye(3)
 
 
 class Fault(NamedTuple):
-    """A trial whose row is no command, and why in words."""
+    """A trial with an invalid command, and the reason in words."""
 
     row: int
     cause: str
 
 
 def unknown_end(status: int, reason: object) -> str:
-    """What is wrong with a row that says that its trial has ended, or ""."""
+    """What is wrong with the end of a trial, or ""."""
     if status not in (Status.SUCCESS, Status.FAILURE):
         return f"the skill's status is {status}, which is none of 0 (running), 1 (success) and 2 (failure)"
     return "" if isinstance(reason, str) else f"the skill's reason is {reason!r:.40}, and no text"
 
 
 def shown(observation: Observation) -> Observation:
-    """Copies that a skill can keep and cannot write to. Nothing leads from them to what the loop goes by."""
+    """Read-only copies of an observation."""
     time, dt, (position, rotation), twist, wrench = observation
     time, position, rotation, twist, wrench = time.copy(), position.copy(), rotation.copy(), twist.copy(), wrench.copy()
     for array in (time, position, rotation, twist, wrench):
@@ -61,10 +58,10 @@ def shown(observation: Observation) -> Observation:
 
 
 def asked(skill: Skill, method: Callable[..., Answer], *arguments: Any) -> Answer:
-    """What a skill's `start` or `step` answers.
+    """The result of a skill's `start` or `step`.
 
     Raises:
-        SkillframeError: it writes into its observation.
+        SkillframeError: the skill writes into its observation.
     """
     try:
         return method(*arguments)
@@ -77,11 +74,11 @@ def asked(skill: Skill, method: Callable[..., Answer], *arguments: Any) -> Answe
 
 
 def check_shapes(skill: Skill, command: Command, lead: tuple[int, ...]) -> None:
-    """Refuse a command that is not one of the whole batch.
+    """Refuse a command that does not fit the batch.
 
     Args:
-        skill: that handed it back, for messages.
-        command: as handed back.
+        skill: its source, for messages.
+        command: as returned.
         lead: (N,), or (N, arms).
 
     Raises:
@@ -102,7 +99,6 @@ def check_shapes(skill: Skill, command: Command, lead: tuple[int, ...]) -> None:
 
 
 def _fields(command: Command, lead: tuple[int, ...]) -> list[tuple[str, Any, tuple[int, ...], str]]:
-    """Each array with its shape and its kinds of numbers."""
     n = lead[:1]
     return [
         ("pose.position", command.pose.position, (*lead, 3), "fiu"),
@@ -133,7 +129,7 @@ def _kind(value: Any) -> str:
 
 
 class ShapeCheck:
-    """Looks at the shapes of a skill's commands as they come, and at all that `check_shapes` does if one is off.
+    """Checks the shapes of a skill's commands, and everything of `check_shapes` if one is off.
 
     Args:
         skill: whose commands.
@@ -146,7 +142,7 @@ class ShapeCheck:
         self._shapes = (*lead, 3), (*lead, 3, 3), (*lead, 6), (*lead, 6), n, n
 
     def __call__(self, command: Command) -> Command:
-        """The command, if it is one of the whole batch.
+        """Check and return a command.
 
         Raises:
             SkillframeError: as `check_shapes`.
@@ -163,7 +159,7 @@ class ShapeCheck:
 
 
 class CommandCheck:
-    """Looks at the commands of one batch as they come.
+    """Checks the commands of one batch.
 
     Args:
         skill: whose commands.
@@ -177,7 +173,7 @@ class CommandCheck:
         self._values: list[Float | None] = [None, None]
 
     def faults(self, command: Command, tick: int) -> list[Fault]:
-        """Trials whose row is no command. The loop leaves out those among them that have ended.
+        """Trials with an invalid command. The loop ignores those that have ended.
 
         Raises:
             SkillframeError: as `check_shapes`.
@@ -190,26 +186,22 @@ class CommandCheck:
             self._rotation = rotation
             near = np.abs(rotation.mT @ rotation - _EYE) <= ROTATION_SLACK
             if np.count_nonzero(near) != near.size or (rare and not (np.linalg.det(rotation) > 0.0).all()):
-                faults += self._turns(rotation)
+                rows = rotation.reshape(self._lead[0], -1, 3, 3)
+                off: Float = np.abs(rows.mT @ rows - _EYE).max(axis=(-1, -2))
+                volume = np.linalg.det(rows)
+                bad: NDArray[np.bool_] = np.isfinite(off) & ((off > ROTATION_SLACK) | (volume < 0.0))
+                worst = np.argmax(bad, axis=-1)
+                text = "the skill's rotation is none: R^T R differs from 1 by {:.2g}, its determinant is {:.2g}"
+                faults += [
+                    Fault(int(i), text.format(off[i, worst[i]], volume[i, worst[i]]))
+                    for i in np.flatnonzero(np.any(bad, axis=-1))
+                ]
         if slow or self._gains is None or stiffness is not self._gains[0] or damping is not self._gains[1]:
             faults += self._springs(command.impedance)
         return faults
 
-    def _turns(self, rotation: Float) -> list[Fault]:
-        """Rows whose rotation is finite and none."""
-        rows = rotation.reshape(self._lead[0], -1, 3, 3)
-        off: Float = np.abs(rows.mT @ rows - _EYE).max(axis=(-1, -2))
-        volume = np.linalg.det(rows)
-        bad: NDArray[np.bool_] = np.isfinite(off) & ((off > ROTATION_SLACK) | (volume < 0.0))
-        worst = np.argmax(bad, axis=-1)
-        text = "the skill's rotation is none: R^T R differs from 1 by {:.2g}, its determinant is {:.2g}"
-        return [
-            Fault(int(i), text.format(off[i, worst[i]], volume[i, worst[i]]))
-            for i in np.flatnonzero(np.any(bad, axis=-1))
-        ]
-
     def _springs(self, impedance: Impedance) -> list[Fault]:
-        """Rows whose stiffness or damping is finite and not possible."""
+        """Rows with finite but invalid stiffness or damping."""
         gains, self._gains = self._gains, impedance
         if gains is None or impedance[0] is not gains[0] or impedance[1] is not gains[1]:
             _check_gains(type(self._skill).__name__, impedance, self._lead)
@@ -232,10 +224,10 @@ _WRONG = {
 
 
 def _impossible(gain: Float, symmetric: bool) -> Any:
-    """(...) which matrices (..., 6, 6) are finite, and not symmetric or with an eigenvalue below zero."""
+    """Which matrices (..., 6, 6) are finite, and not symmetric or with a negative eigenvalue."""
     finite = np.asarray(np.isfinite(gain).all(axis=(-1, -2)))
     sound = np.where(finite[..., None, None], gain, 0.0)
-    slack = IMPEDANCE_SLACK * np.abs(sound).max(axis=(-1, -2)) + 1e-12
+    slack = 1e-6 * np.abs(sound).max(axis=(-1, -2)) + 1e-12  # relative to the largest entry
     even = 0.5 * (sound + sound.mT)
     odd = (np.abs(sound - even).max(axis=(-1, -2)) > slack) & symmetric
     try:

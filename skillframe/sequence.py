@@ -1,14 +1,13 @@
 """Skills made of skills: one after another, or one where another failed.
 
-Every trial is in one part at a time; trials of a batch may be in different parts, and enter them at different times. A
-part that ends is followed by the next one at the next tick, from where the tool is then. Whatever the parts say about
-damping, the controller designs it (from the stiffness and the task-space inertia), so that a trial's damping cannot
-depend on which parts other trials are in. "When insertion fails, search, then retry" is
+Each trial is in one part at a time; trials of a batch may be in different parts. When a part ends, the next one starts
+at the next tick, from where the tool is. The controller designs the damping (from stiffness and task-space inertia)
+whatever the parts command, so that a trial's damping does not depend on the parts of other trials. "When insertion
+fails, search, then retry" is
 
-    fallback(insert, sequence(search, insert)),
+  fallback(insert, sequence(search, insert)),
 
-with `expects_travel_m` on insert: LMC and its like end where they come to rest, and coming to rest too early is the
-signal of failure.
+with `expects_travel_m` on insert: skills such as LMC end at rest, and coming to rest too early means failure.
 """
 
 from __future__ import annotations
@@ -22,22 +21,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.errors import InputError
-from skillframe.frames import Float, Pose, norm
+from skillframe.frames import Float, Pose, norm, rotate, rotate_spatial
 from skillframe.handover import ShapeCheck
-from skillframe.skill import Command, Impedance, Observation, Reasons, Skill, Status, no_reasons, restartable
+from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons, restartable
 
 Rows = NDArray[np.intp]
 END = -1
-"""What `Composition.follows` gives where no part follows."""
+"""Returned by `Composition.follows` if no part follows."""
 
 
 class Part(NamedTuple):
     """One skill of a composition.
 
     Attributes:
-        name: as told in words.
-        make: a fresh skill.
-        expects_travel_m: a success nearer than this to where the part began counts as a failure; 0 takes any.
+        name: for messages.
+        make: returns a new skill.
+        expects_travel_m: a success nearer than this to the part's start counts as a failure; 0 accepts any.
     """
 
     name: str
@@ -46,7 +45,7 @@ class Part(NamedTuple):
 
 
 class Composition(Skill):
-    """N trials, each in one of several parts. What follows what is the subclass's business.
+    """N trials, each in one of several parts. Subclasses define the order.
 
     Args:
         parts: at least one.
@@ -62,11 +61,11 @@ class Composition(Skill):
         """What follows in a trial when a part has ended.
 
         Returns:
-            The part that follows, or `END`; the status of the whole; and why, in words.
+            The part that follows, or `END`; the status of the whole; and the reason in words.
         """
 
     def start(self, observation: Observation, rngs: Several[np.random.Generator]) -> None:
-        """Every trial begins in part 0."""
+        """Start every trial in part 0."""
         n, k = len(rngs), len(self.parts)
         self._rngs = [rng.spawn(k) for rng in rngs]
         self._children: list[Skill | None] = [None] * k
@@ -81,17 +80,41 @@ class Composition(Skill):
             self._note(i, float(observation.time[i]), f"{self.parts[0].name}: begins")
 
     def step(self, observation: Observation) -> Command:
-        """Let every trial's part answer, and look which have ended."""
+        """Step every trial's part, and handle those that have ended."""
         if self._due is not None:
             self._enter(observation, self._due)
             self._due = None
-        command = self._ask(observation)
+        if self._shared is not None:
+            command = self._answer(self._shared, observation)
+            command = command._replace(impedance=Impedance(command.impedance.stiffness))
+        else:
+            answers = [(part, self._answer(part, observation)) for part in self._current_parts]
+            command = _picked(self.current, answers)
         if np.count_nonzero(command.status):
-            command = self._after(observation, command)
+            for i in np.flatnonzero((command.status != Status.RUNNING) & (self._status == Status.RUNNING)).tolist():
+                status, reason = int(command.status[i]), str(command.reason[i])
+                expected = self.parts[int(self.current[i])].expects_travel_m
+                travel = float(norm(observation.pose.position[i] - self._from[i]))
+                if status == Status.SUCCESS and travel < expected:
+                    status = Status.FAILURE
+                    reason = f"{reason}; expected {1e3 * expected:.0f} mm, went {1e3 * travel:.1f} mm"
+                self.leave(i, float(observation.time[i]), status, reason)
+            told = self._reason.copy()
+            told[self._status == Status.RUNNING] = ""
+            command = command._replace(status=self._status.copy(), reason=told)
         return command
 
+    def restart(
+        self, rows: NDArray[np.intp], observation: Observation, rngs: Several[np.random.Generator]
+    ) -> None:  # fmt: skip
+        """Start again in part 0 in the given trials. Subclasses add what they keep of a trial."""
+        for row, rng in zip(rows.tolist(), rngs, strict=True):
+            self._rngs[row], self._journal[row] = rng.spawn(len(self.parts)), []
+            self._status[row], self._reason[row] = Status.RUNNING, ""
+            self.switch(row, 0, float(observation.time[row]), "begins")
+
     def journal(self, trial: int) -> list[tuple[float, str]]:
-        """Which part ran when, and why it was left, in words."""
+        """Time [s] and text of each change of part."""
         return list(self._journal[trial])
 
     def switch(self, row: int, part: int, time: float, why: str) -> None:
@@ -102,7 +125,7 @@ class Composition(Skill):
         self._note(row, time, f"{self.parts[part].name}: {why}")
 
     def leave(self, row: int, time: float, status: int, reason: str) -> None:
-        """Let a trial leave its part with a status, for what follows it, or for the end of the whole."""
+        """Let a trial leave its part with a status. The next part follows, or the whole ends."""
         part = int(self.current[row])
         following, whole, why = self.follows(row, part, status, reason)
         if following != END:
@@ -130,36 +153,14 @@ class Composition(Skill):
         self._shared = first if bool((self.current == first).all()) else None
         self._current_parts: list[int] = np.unique(self.current).tolist()
 
-    def _ask(self, observation: Observation) -> Command:
-        """The command of each trial's own part."""
-        if self._shared is not None:
-            command = self._answer(self._shared, observation)
-            return command._replace(impedance=Impedance(command.impedance.stiffness))
-        answers = [(part, self._answer(part, observation)) for part in self._current_parts]
-        return _picked(self.current, answers)
-
     def _answer(self, part: int, observation: Observation) -> Command:
         child = self._children[part]
         assert child is not None
         return self._checks[part](child.step(observation))
 
-    def _after(self, observation: Observation, command: Command) -> Command:
-        for i in np.flatnonzero((command.status != Status.RUNNING) & (self._status == Status.RUNNING)).tolist():
-            status, reason = self._judged(i, int(command.status[i]), str(command.reason[i]), observation)
-            self.leave(i, float(observation.time[i]), status, reason)
-        return command._replace(status=self._status.copy(), reason=_told(self._status, self._reason))
-
-    def _judged(self, row: int, status: int, reason: str, observation: Observation) -> tuple[int, str]:
-        """A part's end, with the travel that was expected of it."""
-        expected = self.parts[int(self.current[row])].expects_travel_m
-        travel = float(norm(observation.pose.position[row] - self._from[row]))
-        if status == Status.SUCCESS and travel < expected:
-            return Status.FAILURE, f"{reason}; expected {1e3 * expected:.0f} mm, went {1e3 * travel:.1f} mm"
-        return status, reason
-
 
 class Sequence(Composition):
-    """One part after another. The first failure is the whole's."""
+    """One part after another. The first failure ends the whole."""
 
     def follows(self, row: int, part: int, status: int, reason: str) -> tuple[int, int, str]:
         """The next part after a success."""
@@ -169,7 +170,7 @@ class Sequence(Composition):
 
 
 class Fallback(Composition):
-    """The first part that succeeds is enough. A part is tried when those before it have failed."""
+    """Parts tried in order until one succeeds."""
 
     def follows(self, row: int, part: int, status: int, reason: str) -> tuple[int, int, str]:
         """The next part after a failure."""
@@ -178,14 +179,60 @@ class Fallback(Composition):
         return END, status, reason
 
 
-def _told(status: NDArray[np.int64], reason: Reasons) -> Reasons:
-    told = reason.copy()
-    told[status == Status.RUNNING] = ""
-    return told
+class Moved(Skill):
+    """A skill that runs as if base stood at another pose.
+
+    Args:
+        make: returns a new skill.
+        pose: in base, position (3,) and rotation (3, 3), of the frame that the skill takes for base.
+    """
+
+    def __init__(self, make: Callable[[], Skill], pose: Pose) -> None:
+        self._child, self._pose = restartable(make), pose
+
+    def start(self, observation: Observation, rngs: Several[np.random.Generator]) -> None:
+        """Start the skill in its frame."""
+        self._child.start(seen_from(self._pose, observation), rngs)
+
+    def restart(
+        self, rows: NDArray[np.intp], observation: Observation, rngs: Several[np.random.Generator]
+    ) -> None:  # fmt: skip
+        """Start the skill again in the given trials."""
+        self._child.restart(rows, seen_from(self._pose, observation), rngs)
+
+    def step(self, observation: Observation) -> Command:
+        """The skill's command, in base."""
+        return told_from(self._pose, self._child.step(seen_from(self._pose, observation)))
+
+    def journal(self, trial: int) -> list[tuple[float, str]]:
+        """Events of the skill."""
+        return self._child.journal(trial)
+
+
+def seen_from(frame: Pose, observation: Observation) -> Observation:
+    """The observation in the axes of a frame, one pose in base or one for each trial."""
+    back = np.swapaxes(frame.rotation, -1, -2)
+    pose = Pose(rotate(back, observation.pose.position - frame.position), back @ observation.pose.rotation)
+    twist, wrench = (rotate_spatial(back, each) for each in (observation.twist, observation.wrench))
+    return observation._replace(pose=pose, twist=twist, wrench=wrench)
+
+
+def told_from(frame: Pose, command: Command) -> Command:
+    """The command in base of a skill that sees a frame for base."""
+    turn = frame.rotation
+    both = np.zeros((*turn.shape[:-2], 6, 6))
+    both[..., :3, :3] = both[..., 3:, 3:] = turn
+    turned = [None if m is None else both @ m @ np.swapaxes(both, -1, -2) for m in command.impedance]
+    # rounding leaves a turned matrix unsymmetric
+    stiffness, damping = (None if m is None else 0.5 * (m + np.swapaxes(m, -1, -2)) for m in turned)
+    assert stiffness is not None
+    return command._replace(
+        pose=frame.compose(command.pose), twist=rotate_spatial(turn, command.twist),
+        impedance=Impedance(stiffness, damping), feedforward=rotate_spatial(turn, command.feedforward),
+    )  # fmt: skip
 
 
 def _picked(current: Rows, answers: Several[tuple[int, Command]]) -> Command:
-    """One command out of whole-batch commands, each trial's row from the part it is in."""
     _, base = answers[0]
     n = len(current)
     pose = Pose(np.array(base.pose.position), np.array(base.pose.rotation))

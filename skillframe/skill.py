@@ -1,9 +1,9 @@
-r"""The contract of the loop: what a skill sees, what it commands, and how it ends.
+r"""The contract of the loop: what a skill observes, what it commands, and how it ends.
 
 Everything carries a leading dimension N, the trials that run in lock-step; one run is N = 1. A skill answers each
 observation with a desired pose and an impedance, and the controller exerts, at the centre of compliance,
 
-    F = K (x_d - x) + D (v_d - v) + F_ff                                                   (1)
+  F = K (x_d - x) + D (v_d - v) + F_ff                                                   (1)
 
 which is equation (1) of the overview paper with the damping sign that dissipates: D acts on desired minus measured
 twist, and a desired twist of zero is allowed. A skill owns no clock, no files and no randomness of its own.
@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from enum import IntEnum
+from enum import IntEnum, StrEnum
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -26,7 +26,7 @@ _Scalar = TypeVar("_Scalar", bound=np.generic)
 
 
 class Status(IntEnum):
-    """How a skill stands after a step."""
+    """State of a skill after a step."""
 
     RUNNING = 0
     SUCCESS = 1
@@ -34,7 +34,7 @@ class Status(IntEnum):
 
 
 class Observation(NamedTuple):
-    """What a skill sees at one tick, for N trials.
+    """What a skill observes at one tick, for N trials.
 
     Attributes:
         time: (N,) seconds since the start of the run.
@@ -52,7 +52,7 @@ class Observation(NamedTuple):
 
 
 class Impedance(NamedTuple):
-    """Stiffness and damping at the centre of compliance, base axes. Build it once per phase and share it.
+    """Stiffness and damping at the centre of compliance, base axes. Build it once per phase and reuse it.
 
     Attributes:
         stiffness: (N, 6, 6) or (6, 6), symmetric positive semi-definite; zero along compliant axes.
@@ -65,12 +65,12 @@ class Impedance(NamedTuple):
 
 
 class Command(NamedTuple):
-    """What a skill wants, for N trials.
+    """What a skill commands, for N trials.
 
     Attributes:
         pose: desired pose of the centre of compliance in base.
         twist: (N, 6) desired twist, base axes.
-        impedance: how stiffly to follow.
+        impedance: stiffness and damping.
         feedforward: (N, 6) wrench added to equation (1), robot on environment, base axes.
         status: (N,) integers of `Status`.
         reason: (N,) strings: why a trial ended, in words; empty while running.
@@ -88,8 +88,8 @@ class Skill(ABC):
     """A behaviour that runs in the loop, for N trials at once.
 
     `start` is called once with the first observation and one random generator per trial, then `step` at each tick.
-    Rows of trials that have ended are still passed in (frozen) and their commands are ignored. A row's command may
-    depend on that row's observations and generator only, never on another trial.
+    Rows of trials that have ended are still passed in (frozen), and their commands are ignored. A row's command may
+    depend on that row's observations and generator only.
     """
 
     @abstractmethod
@@ -98,15 +98,15 @@ class Skill(ABC):
 
     @abstractmethod
     def step(self, observation: Observation) -> Command:
-        """Answer one observation. This must return at once."""
+        """Return the command for one observation, without waiting."""
 
     def restart(
         self, rows: NDArray[np.intp], observation: Observation, rngs: Sequence[np.random.Generator]
     ) -> None:  # fmt: skip
-        """Start again in some trials, as `start` would in them alone. The others go on undisturbed.
+        """Start again in some trials, as `start` would in them alone. The others continue.
 
-        Compositions use it to let trials enter a skill at different times. A skill that does not provide it is run
-        there with one instance per trial.
+        Compositions use it to let trials enter a skill at different times. A skill without it runs there with one
+        instance per trial.
 
         Args:
             rows: (M,) which trials.
@@ -116,7 +116,7 @@ class Skill(ABC):
         raise NotImplementedError(f"{type(self).__name__} cannot start again in some of its trials; see per_trial")
 
     def journal(self, trial: int) -> list[tuple[float, str]]:
-        """What happened in a trial and why: times [s] and words, or empty if there is nothing to tell."""
+        """Events of a trial: times [s] and words, possibly none."""
         return []
 
 
@@ -152,15 +152,15 @@ class _PerTrial(Skill):
 
 
 def restartable(make: Callable[[], Skill]) -> Skill:
-    """A skill from a factory that can start again in some of its trials: itself, or one instance per trial."""
+    """A skill that can start again in some of its trials: itself, or one instance per trial."""
     skill = make()
     return per_trial(make) if type(skill).restart is Skill.restart else skill
 
 
 def per_trial(make: Callable[[], Skill]) -> Skill:
-    """A batched skill out of a factory of skills written for one trial (N = 1 arrays), one instance per trial.
+    """A batched skill from a factory of skills for one trial (N = 1 arrays), one instance per trial.
 
-    The loop costs about 20 us per trial and tick; write the skill over arrays where campaigns matter.
+    The loop costs about 20 us per trial and tick; write the skill over arrays for large campaigns.
     """
     return _PerTrial(make)
 
@@ -171,13 +171,13 @@ def row(observation: Observation, i: int) -> Observation:
 
 
 def rows_of(observation: Observation, rows: slice | NDArray[np.intp]) -> Observation:
-    """The observation of some trials as a batch of their own."""
+    """The observation of some trials as a batch."""
     pose = Pose(observation.pose.position[rows], observation.pose.rotation[rows])
     return Observation(observation.time[rows], observation.dt, pose, observation.twist[rows], observation.wrench[rows])
 
 
 def stack_commands(commands: Sequence[Command]) -> Command:
-    """One command out of commands of single trials."""
+    """One command from commands of single trials."""
 
     def each(pick: Callable[[Command], NDArray[_Scalar]]) -> NDArray[_Scalar]:
         return np.concatenate([pick(c) for c in commands])
@@ -198,3 +198,39 @@ def stack_commands(commands: Sequence[Command]) -> Command:
         each(lambda c: c.status),
         each(lambda c: c.reason),
     )
+
+
+class Ended(StrEnum):
+    """The column `ended_by` of results.csv."""
+
+    GOAL = "goal"  # the goal was reached
+    SKILL = "skill"  # the skill reported that it is done, or has failed
+    TIME = "time"
+    FORCE = "force"  # filtered estimate
+    TORQUE = "torque"
+    TRUE_FORCE = "true_force"  # of the simulator
+    TRUE_TORQUE = "true_torque"
+    TORQUE_RATE = "torque_rate"
+    MOTOR = "motor"
+    SPEED = "speed"  # of a joint
+    RANGE = "range"  # of a joint
+    COLLISION = "collision"
+    WORKSPACE = "workspace"
+    ENERGY = "energy"
+    DIVERGED = "diverged"
+    COMMAND = "command"  # the skill returned an invalid command
+    MACHINE = "machine"  # its FMUs, their coupling, its swing
+    SENSOR = "sensor"  # impossible readings of a machine
+    LINK = "link"  # a real robot that stopped, or is no longer heard
+    WATCHDOG = "watchdog"  # a machine that does not follow its command
+    INTERRUPTED = "interrupted"
+    START = "start"  # began in penetration: counts neither as success nor as failure
+    LOST = "lost"  # the process ended without an outcome
+
+
+class Broken(NamedTuple):
+    """A trial `row` that has to end now, with its code and an explanation."""
+
+    row: int
+    code: Ended
+    cause: str

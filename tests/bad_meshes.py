@@ -4,8 +4,8 @@ import json
 import struct
 
 import numpy as np
+from skillframe_parts.solid import arrays_of
 
-from skillframe.parts.solid import arrays_of
 from tests.part_meshes import box, round_pair
 
 CUBE = box((0, 0, 0), (10, 10, 10))

@@ -11,15 +11,15 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
+from skillframe_hydraulics.force.momentum import Estimate
+from skillframe_hydraulics.law import vdc_actuator as act
+from skillframe_hydraulics.law.hydraulic import Measured, Terms
+from skillframe_hydraulics.law.vdc_reference import ToolTask
 
+from skillframe.cosim.energy_balance import Motion
 from skillframe.cosim.master import CosimSettings, Master
-from skillframe.cosim.plant import Motion
 from skillframe.fmu.actuator import ActuatorSpec
 from skillframe.fmu.opening import open_actuators
-from skillframe.machine.force.momentum import Estimate
-from skillframe.machine.law import vdc_actuator as act
-from skillframe.machine.law.hydraulic import Measured, Terms
-from skillframe.machine.law.vdc_reference import ToolTask
 from skillframe.world.convert import SOLIMP, SOLREF, build_spec
 from skillframe.world.scene import Geom, Scene, Tool
 from skillframe.world.scene import Task as SceneTask
@@ -215,7 +215,7 @@ class Press:
     def __init__(self, case, seeds, settings=None):
         self.rngs, count = [np.random.default_rng(seed) for seed in seeds], len(seeds)
         self.plant, self.law = Cranes(case), Law(count, case.damping)
-        z = ToolTask(crane(), (0, 2), ("extension",)).solve(crane(), START, np.array([0.8, -1.6, 0.5]))
+        z = ToolTask(crane(), np.eye(3)[[0, 2]], ("extension",)).solve(crane(), START, np.array([0.8, -1.6, 0.5]))
         self.plant.reset(z)
         spec = [
             ActuatorSpec(
@@ -250,7 +250,7 @@ class Press:
         measured = self.measure()
         at = terms(crane(), measured.z, measured.rate)
         if t == 0.0:
-            self.estimator.start(measured)
+            self.estimator.start()
         self.estimator.calibrate(t < AIR)
         estimate = self.estimator.step(measured, at)
         self.force, self.sigma = estimate.answered, estimate.sigma
@@ -279,7 +279,7 @@ def replay(log, estimator):
     for k in range(len(log.force)):
         measured, at = Measured(*(x[k] for x in log.measured)), Terms(*(x[k] for x in log.terms))
         if k == 0:
-            estimator.start(measured)
+            estimator.start()
         estimator.calibrate(k * DT < AIR)
         rows.append(estimator.step(measured, at))
     return Estimate(*(np.array(x) for x in zip(*rows, strict=True)))

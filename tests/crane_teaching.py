@@ -11,17 +11,17 @@ from math import atan, degrees, radians, tan
 from typing import NamedTuple
 
 import numpy as np
+from skillframe_hydraulics.sessions import aimed, demonstration_of_machine, operate
+from skillframe_hydraulics.teleoperation import OperatorSettings
 from skillframe_papers.rows.crane_taught import LEARN
 
 from skillframe.demonstration.record import Demonstration
-from skillframe.document.source import learned
+from skillframe.document.file import learned
 from skillframe.execution.prepare import load_robot_model, load_world
 from skillframe.execution.trace import Trace
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import norm
-from skillframe.teaching.machine_sessions import aimed, demonstration_of_machine, operate
-from skillframe.teaching.teleoperation import OperatorSettings
 
 SLIDE, OFF = 0.25, 0.12  # m: left to slide once landed, and from the surface at the start
 CORNER = np.array([0.5, 0.482])  # x, z of the tool in the world's corner [m]

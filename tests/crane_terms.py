@@ -2,8 +2,7 @@
 
 import numpy as np
 import pinocchio as pin
-
-from skillframe.machine.law.hydraulic import Terms
+from skillframe_hydraulics.law.hydraulic import Terms
 
 
 def mass_rate_term(state):
@@ -22,7 +21,8 @@ def one(chain, z, zd):
     jacobian = state.jacobian(frame)[[0, 2]]
     tip = np.array(state.data.oMf[frame].translation)[[0, 2]]
     return Terms(
-        state.mass, mass_rate_term(state), state.gravity, jacobian, state.arms, *state.piston, tip, jacobian @ zd
+        state.mass, mass_rate_term(state), state.gravity, jacobian, state.arms, *state.driven_motion, tip,
+        jacobian @ zd, state.load_gravity,
     )  # fmt: skip
 
 

@@ -30,7 +30,7 @@ def draws(count, seed):
 
 
 def press(robot, count, seed, seconds=16.0) -> Result:
-    """So many trials with the skill of docs/how-to/pallets.md; a trace at 1 kHz."""
+    """So many trials with the skill of docs/how-to/own-crane.md; a trace at 1 kHz."""
     document = json.loads(SKILL.read_text(encoding="utf-8"))
     skill, setup = prepare(load_robot_model(str(robot)), load_world("pallets", {}), document)
     rngs = [np.random.default_rng([seed, i]) for i in range(count)]

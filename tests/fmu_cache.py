@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from skillframe.fmu.toolchain import find_compiler
+from skillframe.fmu.build import find_compiler
 
 
 @pytest.fixture(scope="package", autouse=True)

@@ -3,8 +3,7 @@
 import manifold3d
 import numpy as np
 import trimesh
-
-from skillframe.parts.solid import arrays_of
+from skillframe_parts.solid import arrays_of
 
 SIDES = 12
 """Of what is round: few, so that tests are fast."""

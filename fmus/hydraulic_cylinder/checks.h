@@ -10,6 +10,7 @@
 
 static inline Outcome check_position(const Model *m, double x, Report *r)
 {
+    if (m->value[DISPLACEMENT] > 0.0) return OK;   /* a motor turns without end */
     double slack = fmin(0.02 + 0.02 * m->value[STROKE],
                         0.5 * fmin(m->value[DEAD_VOLUME_A] / m->own.area_a, m->value[DEAD_VOLUME_B] / m->own.area_b));
     if (x >= -slack && x <= m->value[STROKE] + slack) return OK;
@@ -31,11 +32,11 @@ static inline Outcome require(int fine, const char *name, const char *rule, doub
 static inline Outcome check_parameters(const Model *m, Report *r)
 {
     static const int positive[] = {BORE, STROKE, DEAD_VOLUME_A, DEAD_VOLUME_B, BULK_MODULUS, RATED_FLOW,
-                                   RATED_PRESSURE_DROP, SPOOL_FREQUENCY, SPOOL_DAMPING, LAMINAR_PRESSURE,
-                                   STRIBECK_VELOCITY, PRESLIDING_LENGTH, PUMP_DROOP, SUPPLY_VOLUME, CUSHION_FLOW,
+                                   RATED_PRESSURE_DROP, EDGE_PA, EDGE_PB, EDGE_AT, EDGE_BT, SPOOL_FREQUENCY, SPOOL_DAMPING, LAMINAR_PRESSURE,
+                                   STRIBECK_VELOCITY, PRESLIDING_LENGTH, CUSHION_FLOW,
                                    SUBSTEP, TOLERANCE};
-    static const int not_negative[] = {ROD, BULK_MODULUS_SLOPE, AIR_FRACTION, SPOOL_SLEW, DEADBAND, HYSTERESIS, LEAKAGE,
-                                       COULOMB_FRICTION, VISCOUS_FRICTION, STATIC_FRICTION, PUMP_FLOW,
+    static const int not_negative[] = {DISPLACEMENT, ROD, BULK_MODULUS_SLOPE, AIR_FRACTION, SPOOL_SLEW, DEADBAND, HYSTERESIS, LEAKAGE,
+                                       COULOMB_FRICTION, VISCOUS_FRICTION, STATIC_FRICTION,
                                        ENDSTOP_STIFFNESS, ENDSTOP_DAMPING, CUSHION_LENGTH, RELIEF_CONDUCTANCE,
                                        CHECK_CONDUCTANCE};
     const double *v = m->value;

@@ -47,6 +47,7 @@ static Spool spool_at(const Model *m, Spool s, double t)
 
 static double end_stop(const Model *m, double x, double v)
 {
+    if (is_motor(m)) return 0.0;
     double low = -x, high = x - m->value[STROKE], k = m->value[ENDSTOP_STIFFNESS], d = m->value[ENDSTOP_DAMPING];
     if (low > 0.0) return fmax(0.0, k * low - d * v);
     if (high > 0.0) return -fmax(0.0, k * high + d * v);
@@ -66,7 +67,7 @@ static double friction(const Model *m, double z, double v) { return m->own.stiff
 /* Force without the seals' deflection, and its rate, at one instant: what the quadrature of impulse and work needs. */
 typedef struct { double smooth, rate, stop; } Push;
 
-static Push push(const Model *m, const double p[3], const Chambers *c, const Motion *w)
+static Push push(const Model *m, const double p[2], const Chambers *c, const Motion *w)
 {
     const Own *o = &m->own;
     double viscous = m->value[VISCOUS_FRICTION];
@@ -94,6 +95,7 @@ static void write_outputs(Model *m, const Chambers *c)
     v[FORCE] = m->own.area_a * v[PRESSURE_A] - m->own.area_b * v[PRESSURE_B] - v[FRICTION]
                + end_stop(m, m->own.position, speed);
     v[FLOW_A] = c->flow_a, v[FLOW_B] = c->flow_b, v[FLOW_SUPPLY] = c->flow_supply;
+    v[SUPPLY_SLOPE] = c->supply_slope;
     m->own.stale = 0.0;
 }
 
@@ -112,11 +114,11 @@ static void derive(Model *m)
     double drop = v[RATED_PRESSURE_DROP] * (v[RATED_DROP_IS_PER_EDGE] != 0.0 ? 1.0 : 0.5);
     m->own.area_a = 0.25 * PI * v[BORE] * v[BORE];
     m->own.area_b = m->own.area_a - 0.25 * PI * v[ROD] * v[ROD];
+    if (is_motor(m)) m->own.area_a = m->own.area_b = v[DISPLACEMENT];
     m->own.edge = v[RATED_FLOW] / sqrt(drop);
     m->own.cushion = v[CUSHION_FLOW] / sqrt(v[RATED_PRESSURE_DROP]);
     m->own.omega = 2.0 * PI * v[SPOOL_FREQUENCY];
     m->own.stiffness = v[COULOMB_FRICTION] / v[PRESLIDING_LENGTH];
-    m->own.pump_slope = v[PUMP_FLOW] / v[PUMP_DROOP];
 }
 
 /* Static equilibrium: closed or steadily open valve, pressures that hold initial_force (README eq. 10). */
@@ -126,7 +128,6 @@ static void settle(Model *m)
     double over = v[INITIAL_FORCE] - (m->own.area_a - m->own.area_b) * low;
     v[PRESSURE_A] = over > 0.0 ? low + over / m->own.area_a : low;
     v[PRESSURE_B] = over > 0.0 ? low : low - over / m->own.area_b;
-    v[PRESSURE_SUPPLY] = v[SUPPLY_PRESSURE];
     v[SPOOL] = m->own.target = m->own.demand = u;
     m->own.demand_time = m->time;
     v[SPOOL_VELOCITY] = v[DEFLECTION] = v[WORK] = 0.0;
@@ -164,7 +165,7 @@ Outcome model_outputs(Model *m, Report *r)
     if (m->own.stale == 0.0) return OK;
     Chambers c;
     Motion w = present(m);
-    const double p[3] = {m->value[PRESSURE_A], m->value[PRESSURE_B], m->value[PRESSURE_SUPPLY]};
+    const double p[2] = {m->value[PRESSURE_A], m->value[PRESSURE_B]};
     chambers(m, &w, p, &c);
     write_outputs(m, &c);
     return OK;
@@ -191,8 +192,7 @@ static double next_break(double t, double usual, double step, const double break
 Outcome model_step(Model *m, double step, Report *r)
 {
     double *v = m->value, a = v[ACCELERATION], t = 0.0, impulse = 0.0, work = 0.0, z = v[DEFLECTION];
-    double p[3] = {v[PRESSURE_A], v[PRESSURE_B], v[PRESSURE_SUPPLY]}, q[3];
-    int n = v[PUMP_FLOW] > 0.0 ? 3 : 2;
+    double p[2] = {v[PRESSURE_A], v[PRESSURE_B]}, q[2];
     Spool s0 = {v[SPOOL], v[SPOOL_VELOCITY]};
     double largest = step / ceil(step / v[SUBSTEP] * 0.9999), usual = largest;
     double last = v[POSITION] + step * (v[VELOCITY] + 0.5 * a * step);
@@ -208,7 +208,7 @@ Outcome model_step(Model *m, double step, Report *r)
     while (t < step) {
         double end = next_break(t, usual, step, breaks), h = end - t;
         there = motion_at(m, s0, end);
-        double error = rosenbrock(m, &c, &there, h, n, p, q);
+        double error = rosenbrock(m, &c, &there, h, p, q);
         if (error > v[TOLERANCE]) {
             usual = h * clip(0.8 * cbrt(v[TOLERANCE] / error), 0.1, 0.7);
             if (usual >= LEAST_SUBSTEP) continue;
@@ -224,9 +224,9 @@ Outcome model_step(Model *m, double step, Report *r)
         g = push(m, q, &d, &there);
         accumulate(&f, &here, &g, &there, h, &impulse, &work);
         here = there, c = d, f = g, t = end;
-        p[A] = q[A], p[B] = q[B], p[S] = q[S];
+        p[A] = q[A], p[B] = q[B];
     }
-    v[PRESSURE_A] = p[A], v[PRESSURE_B] = p[B], v[PRESSURE_SUPPLY] = p[S];
+    v[PRESSURE_A] = p[A], v[PRESSURE_B] = p[B];
     v[SPOOL] = here.spool.x, v[SPOOL_VELOCITY] = here.spool.v, v[DEFLECTION] = z;
     v[FORCE_MEAN] = impulse / step, v[WORK] = work;
     m->own.position = here.position, m->own.velocity = here.velocity;
@@ -237,11 +237,11 @@ Outcome model_step(Model *m, double step, Report *r)
 Outcome model_rates(Model *m, double rates[], Report *r)
 {
     double *v = m->value, demand = demand_at(m, m->time), w = m->own.omega;
-    const double p[3] = {v[PRESSURE_A], v[PRESSURE_B], v[PRESSURE_SUPPLY]};
+    const double p[2] = {v[PRESSURE_A], v[PRESSURE_B]};
     Chambers c;
     Motion now = present(m);
     chambers(m, &now, p, &c);
-    v[DER_PRESSURE_A] = c.rate[A], v[DER_PRESSURE_B] = c.rate[B], v[DER_PRESSURE_SUPPLY] = c.rate[S];
+    v[DER_PRESSURE_A] = c.rate[A], v[DER_PRESSURE_B] = c.rate[B];
     v[DER_SPOOL] = v[SPOOL_VELOCITY];
     v[DER_SPOOL_VELOCITY] = w * w * (demand - v[SPOOL]) - 2.0 * v[SPOOL_DAMPING] * w * v[SPOOL_VELOCITY];
     v[DER_DEFLECTION] = deflection_rate(m, v[DEFLECTION], now.velocity);

@@ -1,4 +1,4 @@
-"""The Python API: record, learn, run, campaign, report, with objects, names and file paths alike (ours).
+"""The Python API: record, learn, run, campaign, report, with objects, names and file paths alike.
 
-A user imports these names from `skillframe` itself. The command line calls the same functions.
+Users import these names from `skillframe`. The command line calls the same functions.
 """

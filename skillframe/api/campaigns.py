@@ -1,4 +1,4 @@
-"""`Campaign` and `CampaignResults`: a skill run many times over declared uncertainty, and what came of it."""
+"""`Campaign` and `CampaignResults`: skills run many times over declared uncertainty, and the results."""
 
 from __future__ import annotations
 
@@ -16,30 +16,27 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.api.inputs import File
+from skillframe.api.inputs import File, Robot
 from skillframe.api.learning import LearnedSkill, Skills, skill_of
 from skillframe.api.running import SingleRun
-from skillframe.api.tasks import Robot
 from skillframe.campaign import evaluate
 from skillframe.campaign.folder import campaign_hash, load, prepare
-from skillframe.campaign.replay import pick_label
-from skillframe.campaign.rows import LEFT_OUT, absent, columns
-from skillframe.campaign.runner import Options, Progress, run_campaign, trace_path
+from skillframe.campaign.rows import LEFT_OUT, absent, columns, is_trial
+from skillframe.campaign.runner import Options, Progress, pick_label, run_campaign, trace_path
 from skillframe.campaign.spec import CampaignSpec, place_of
 from skillframe.campaign.store import ordered, read_content
 from skillframe.campaign.summary import read_summary
 from skillframe.config import read_toml
-from skillframe.document.file import save
-from skillframe.document.source import parse_source
+from skillframe.document.file import parse_source, save
 from skillframe.errors import InputError
 from skillframe.extend.registry import registry
 from skillframe.robot.model import RobotModel
 from skillframe.robot.spec import RobotSpec, load_robot
 
 DEFAULTS: Mapping[str, Any] = {"robot": "panda", "trials": 100, "seed": 0}
-"""Of a plan that stands in no file; our choice."""
+"""Defaults of a plan without a file."""
 PLAN = Path("campaign")
-"""What errors call a plan that stands in no file."""
+"""Name of a plan without a file in errors."""
 
 
 class SkillRate(NamedTuple):
@@ -50,7 +47,8 @@ class SkillRate(NamedTuple):
         rate: successes over trials; None without a trial.
         interval_95: bounds of the success probability; None where no interval holds, for the reason in `method`.
         method: of the interval, in words.
-        left_out_after: trials after which a race left the skill out; None where none did.
+        left_out_after: trials after which a race left the skill out, or None.
+        refused: starts in penetration, which are no trials and in none of the counts.
     """
 
     trials: int
@@ -59,15 +57,16 @@ class SkillRate(NamedTuple):
     interval_95: tuple[float, float] | None
     method: str
     left_out_after: int | None = None
+    refused: int = 0
 
 
 class CampaignResults:
     """The results of a campaign, read from its folder.
 
     Attributes:
-        folder: where everything is kept; what `skillframe campaign` and `skillframe report` take.
+        folder: of the campaign, as `skillframe campaign` and `skillframe report` take it.
         summary: content of summary.json.
-        rows: a dict a trial and skill, by the columns of results.csv.
+        rows: a dict per trial and skill, with the columns of results.csv.
 
     Args:
         folder: of a campaign that ran.
@@ -99,6 +98,8 @@ class CampaignResults:
     def table(self, skill: str | None = None) -> dict[str, NDArray[Any]]:
         """The columns of results.csv as arrays (trials,), for one skill, in the order of the trials.
 
+        Refused starts are left out.
+
         Args:
             skill: its label or the label's beginning; None for the first.
 
@@ -106,7 +107,7 @@ class CampaignResults:
             UnknownName: no such skill.
         """
         label = pick_label(self.spec.labels, skill)
-        mine = [row for row in self.rows if row["skill"] == label]
+        mine = [row for row in self.rows if row["skill"] == label and is_trial(row)]
         return {name: np.array([row.get(name, absent(name)) for row in mine]) for name in columns(self.spec, self.rows)}
 
     def run_of(self, trial: int, skill: str | None = None) -> SingleRun:
@@ -131,13 +132,15 @@ def _rate(found: Mapping[str, Any]) -> SkillRate:
     interval = found["interval_95"]
     bounds = None if interval is None else (float(interval[0]), float(interval[1]))
     left = found.get(LEFT_OUT)
-    return SkillRate(found["trials"], found["successes"], found["rate"], bounds, found["method"], left)
+    refused = int(found.get("refused", 0))
+    return SkillRate(found["trials"], found["successes"], found["rate"], bounds, found["method"], left, refused)
 
 
 def _said(rate: SkillRate) -> str:
     if rate.rate is None:
         return "no trial yet"
     text = f"{rate.successes} of {rate.trials}, rate {rate.rate:.3f}"
+    text += f", {rate.refused} starts refused" if rate.refused else ""
     text += "" if rate.interval_95 is None else f" ({rate.interval_95[0]:.3f} to {rate.interval_95[1]:.3f})"
     return text if rate.left_out_after is None else f"{text}, left out after {rate.left_out_after} trials"
 
@@ -145,19 +148,18 @@ def _said(rate: SkillRate) -> str:
 class Campaign:
     """A plan of what runs, how often, and what varies.
 
-    The plan is a campaign.toml, a dict with its keys, or keywords; keywords replace keys of the file or dict. Relative
-    paths start in the file's folder, those of a dict and of keywords in the working directory.
+    The plan is a campaign.toml, a dict with its keys, or keywords, which override the file or dict. Relative paths
+    start in the file's folder, those of a dict and of keywords in the working directory.
 
     Attributes:
         spec: the checked plan.
 
     Args:
-        plan: a campaign.toml, or a dict with its keys; None where keywords say it all.
+        plan: a campaign.toml, or a dict with its keys; None for keywords alone.
         world: a world's name, or its fixture file.
-        skills: learned skills, skill files, "TYPE:DEMONSTRATION", or a dict of these by the names they get in results.
-        **keys: the other keys of campaign.toml: `robot` ("panda" if nothing says otherwise), `trials` (100), `seed`
-            (0), `vary` {"fixture.tilt_y": {"uniform": [-0.1, 0.1]}}, `set`, `coc`, `duration_s`, `stop`, `race`,
-            `expect`, `name`.
+        skills: learned skills, skill files, "TYPE:DEMONSTRATION", or a dict of these by their names in results.
+        **keys: the other keys of campaign.toml: `robot` ("panda" by default), `trials` (100), `seed` (0), `vary`
+            {"fixture.tilt_y": {"uniform": [-0.1, 0.1]}}, `set`, `coc`, `duration_s`, `stop`, `race`, `expect`, `name`.
 
     Raises:
         InputError: a key or value that cannot be used; names it.
@@ -185,7 +187,7 @@ class Campaign:
         self.spec = CampaignSpec.from_table(table, name)
 
     def _entries(self, skills: Skills | Sequence[Skills] | Mapping[str, Skills]) -> list[str]:
-        """The entries of `skills`, with absolute paths. What is in memory is written into a folder of its own."""
+        """The entries of `skills`, with absolute paths. Skills in memory are written into a temporary folder."""
         if isinstance(skills, Mapping) and "format" not in skills:
             return [self._written(skill_of(skill), name) for name, skill in skills.items()]
         alone = isinstance(skills, str | os.PathLike | LearnedSkill | Mapping)
@@ -206,10 +208,10 @@ class Campaign:
         return str(path)
 
     def prepare(self, out: File) -> Path:
-        """Make the campaign's folder, with copies of all that it needs, without running a trial.
+        """Make the campaign's folder, with copies of its files, without running a trial.
 
         Raises:
-            InputError: the folder holds something, or skill, robot and world do not fit together.
+            InputError: the folder is not empty, or skill, robot and world do not fit together.
         """
         prepare(self.spec, Path(out), evaluate.describe, registry().world(self.spec.world_place).params)
         return Path(out)
@@ -221,13 +223,13 @@ class Campaign:
         """Run it.
 
         Args:
-            out: folder for the results, absent or empty; None for a temporary one that goes with the results.
-            workers: processes on this machine; None for this one alone. None of this changes a row.
+            out: folder for the results, absent or empty; None for a temporary one that lives as long as the results.
+            workers: processes on this machine; None for this one alone. Rows do not depend on it.
             traces: how many trials per skill leave a trace.
             progress: called after every chunk of trials, and now and then within one.
 
         Raises:
-            InputError: the folder holds something, or skill, robot and world do not fit together.
+            InputError: the folder is not empty, or skill, robot and world do not fit together.
             CampaignError: trouble of the environment stopped it; finished rows are kept in `out`.
             KeyboardInterrupt: Ctrl-C; likewise.
         """
@@ -253,10 +255,10 @@ class Campaign:
 
 @contextmanager
 def _script_unseen() -> Iterator[None]:
-    """Within this, worker processes do not run the user's script again.
+    """While open, worker processes do not run the user's script again.
 
     `multiprocessing` imports the main module in every process that it spawns, so that a script without a
-    `__name__ == "__main__"` would start over in each. What workers run stands in modules of its own.
+    `__name__ == "__main__"` guard would start again in each.
     """
     main = sys.modules["__main__"]
     kept = {name: getattr(main, name) for name in ("__file__", "__spec__") if hasattr(main, name)}
@@ -270,7 +272,7 @@ def _script_unseen() -> Iterator[None]:
 
 
 def _table(plan: File | Mapping[str, Any] | None) -> dict[str, Any]:
-    """The keys of a plan. A file's, with absolute paths."""
+    """The keys of a plan. Those of a file have absolute paths."""
     if plan is None or isinstance(plan, Mapping):
         return {**DEFAULTS, **(plan or {})}
     table, folder = read_toml(Path(plan)), Path(plan).absolute().parent
@@ -289,7 +291,7 @@ def _absolute(entry: str, folder: Path) -> str:
 
 
 def _robot_entry(robot: object) -> object:
-    """What a campaign file calls a robot. What is no robot is left to the plan's own check."""
+    """A robot as a campaign file names it. Other values are left to the plan's check."""
     if isinstance(robot, RobotModel | RobotSpec):
         spec = robot.spec if isinstance(robot, RobotModel) else robot
         file = spec.folder / "robot.toml"

@@ -5,22 +5,20 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skillframe.api.inputs import Demonstrations, File, demonstrations_of
-from skillframe.conditioning.audit import audit, compared
 from skillframe.demonstration.record import Demonstration
-from skillframe.document import file, source
+from skillframe.document import file
 from skillframe.errors import InputError, SkillframeWarning
-from skillframe.extend.records import Document, Illustration, LearnOptions, SkillType
+from skillframe.extend.records import Document, Explanation, Illustration, LearnOptions, SkillType, no_progress
 from skillframe.extend.registry import registry
-from skillframe.files import write_whole
 from skillframe.skill import Skill
 
-if TYPE_CHECKING:  # what needs no simulator learns
-    from skillframe.api.tasks import Robot, Settings, World
+if TYPE_CHECKING:  # learning needs no simulator
+    from skillframe.api.inputs import Robot, Settings, World
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
@@ -28,9 +26,9 @@ class LearnedSkill:
     """A skill as a document: what was learned, from what, in which frame.
 
     Attributes:
-        document: the content of the skill file as plain JSON values; the page "Files" has its keys.
-        name: what results call it: the file's name without its ending, else the kind of skill.
-        source: what the command line calls it: a file, or TYPE:DEMONSTRATION; None for one that was never saved.
+        document: the content of the skill file as JSON values; the page "Files" has its keys.
+        name: in results: the file's name without its ending, or the kind of skill.
+        source: on the command line: a file, or TYPE:DEMONSTRATION; None for a skill that was never saved.
     """
 
     document: Document
@@ -47,9 +45,9 @@ class LearnedSkill:
         """
         text = os.fspath(skill)
         if isinstance(skill, str):
-            name, document = source.load_skill(text)
+            name, document = file.load_skill(text)
         else:
-            name, document = source.SkillSource("", (text,)).name, file.load(Path(text))
+            name, document = file.SkillSource("", (text,)).name, file.load(Path(text))
         return cls(document=document, name=name, source=text)
 
     @property
@@ -59,7 +57,7 @@ class LearnedSkill:
 
     @property
     def phases(self) -> list[dict[str, Any]]:
-        """The phases. What one holds is its kind's business."""
+        """The phases. Their content depends on the kind of skill."""
         phases: list[dict[str, Any]] = self.document["phases"]
         return phases
 
@@ -71,7 +69,7 @@ class LearnedSkill:
 
     @property
     def summary(self) -> list[str]:
-        """What it does, how sure that is ("sure: ..."), and what to do next ("next: ..."), or all of its words."""
+        """What it does, how certain that is ("sure: ..."), and what to do next ("next: ..."), or all of its words."""
         kind = self._kind()
         if kind.advice is None:
             return self.words
@@ -80,50 +78,49 @@ class LearnedSkill:
 
     @property
     def pictures(self) -> list[Illustration]:
-        """Pictures that say why it is as it is, each with a title, a caption and SVG text."""
+        """Pictures that explain the skill, each with a title, a caption and SVG text."""
         kind = self._kind()
         return kind.explain(self.document) if kind.explain is not None else []
 
     def save(self, path: File) -> LearnedSkill:
-        """Write the skill file, whole or not at all. Gives the same skill under the file's name.
+        """Write the skill file as a whole. Returns the same skill under the file's name.
 
         Raises:
             InputError: the file cannot be written.
         """
         file.save(self.document, Path(path))
         return LearnedSkill(
-            document=self.document, name=source.SkillSource("", (os.fspath(path),)).name, source=os.fspath(path)
+            document=self.document, name=file.SkillSource("", (os.fspath(path),)).name, source=os.fspath(path)
         )
 
     def explain(self, out: File) -> int:
-        """Write words and pictures as one HTML page (.html). Gives the number of pictures.
+        """Write words and pictures as one HTML page (.html). Returns the number of pictures.
 
         Raises:
             InputError: the file cannot be written.
+            UnknownName: skillframe-reports, which writes the page, is not installed.
         """
-        from skillframe.reports.explained import page
-
-        pictures = self.pictures
+        output, pictures = registry().output("explanation"), self.pictures
         title = self.name if self.source is None else Path(self.source).name
-        write_whole(Path(out), page(title, self.document, self.words, pictures).encode())
+        output.write(Explanation(title, self.document, self.words, pictures), Path(out), no_progress)
         return len(pictures)
 
     def build(
         self, world: World, robot: Robot = "panda", *, coc: str | None = None, set: Settings | None = None
     ) -> Skill:
-        """The skill that steps itself, for a world and a robot: a part of a sequence, or to be called by other loops.
+        """The runnable skill for a world and a robot: a part of a sequence, or for loops of your own.
 
         Args:
             world: a name, a fixture file, or a scene of your own.
             robot: a name, a robot.toml or its folder, or a loaded robot.
             coc: centre of compliance, "x,y,z" [m] in the tool frame or a frame's name; None as learned.
-            set: what differs from the nominal in the world.
+            set: deviations from the nominal world.
 
         Raises:
-            InputError: the skill says where it goes, and that is outside the robot's workspace.
+            InputError: the skill's area lies outside the robot's workspace.
             UnknownName: no such world, robot, frame or setting.
         """
-        from skillframe.api.tasks import robot_of, scene_of
+        from skillframe.api.inputs import robot_of, scene_of
         from skillframe.execution.prepare import prepare
 
         scene, _ = scene_of(world, set, depth=2)
@@ -148,53 +145,32 @@ Skills = LearnedSkill | File | Mapping[str, Any]
 
 def learn(
     demonstrations: Demonstrations, skill: str = "lmc", *, at: str | None = None, hand: str | None = None,
-    axes: str = "base", exception: str | None = None, blind: Sequence[File] = (), **settings: Any,
+    axes: str = "base", **settings: Any,
 ) -> LearnedSkill:  # fmt: skip
     """Learn a skill from demonstrations of one phase. For a whole task see `segment`.
 
-    What looks wrong in the recordings (a biased wrench, gaps) is warned of, as a `SkillframeWarning`.
+    Suspicious recordings (a biased wrench, gaps) cause a `SkillframeWarning`.
 
     Args:
         demonstrations: one or several, as objects or files.
-        skill: kind of skill: "lmc", "search", "dual_arm", "replay", "dmp", "gmr", "seds", "acp" or a plug-in's.
-        at: where it is learned: a frame's name or "x,y,z" [m] in the tool frame; None for the recorded tool point.
-        hand: where the hand held, for the work of torques; None for the recording's own, else the learning point.
-        axes: "base", or "phase_start": the tool's attitude at the start of the phase.
-        exception: kind of skill that searches where this one stalls, "search" or "spiral"; makes a "seat" of it.
-        blind: files of blind searches to learn that of `exception` from.
-        **settings: of the learner; `skillframe plugins show lmc` lists them [SI].
+        skill: kind of skill: "lmc", "seat", "search", "dual_arm", "replay", "dmp", "gmr", "seds", "acp" or a plug-in's.
+        at: learning point: a frame's name or "x,y,z" [m] in the tool frame; None for the recorded tool point.
+        hand: point that the teacher held, for the work of torques; None for the recording's own, or the learning point.
+        axes: "base", or "phase_start": the tool's orientation at the start of the phase.
+        **settings: of the learner; `skillframe plugins lmc` lists them [SI].
 
     Raises:
         InputError: a demonstration or a setting cannot be used, or demonstrations do not fit together.
         UnknownName: no such kind of skill, frame or setting.
     """
-    options = LearnOptions(at=at, hand=hand, axes=axes, settings=settings)
-    if exception is not None:
-        skill, options = seating(skill, exception, blind, options)
-    return learn_with(demonstrations, skill, options)
-
-
-def seating(skill: str, exception: str, blind: Sequence[File], options: LearnOptions) -> tuple[str, LearnOptions]:
-    """The kind of skill that a learned one becomes with a search where it stalls, and its options.
-
-    Args:
-        skill: kind that pushes.
-        exception: kind that searches.
-        blind: files that the search is learned from.
-        options: of the one that pushes.
-
-    Raises:
-        UnknownName: no such kind of skill is installed.
-    """
-    own = {"skill": skill, "exception": exception, "blind": [os.fspath(file) for file in blind]}
-    return registry().skill("seat").name, replace(options, settings={**options.settings, **own})
+    return learn_with(demonstrations, skill, LearnOptions(at=at, hand=hand, axes=axes, settings=settings))
 
 
 def learn_with(demonstrations: Demonstrations, skill: str, options: LearnOptions) -> LearnedSkill:
     """As `learn`, for settings of any name."""
     kind = registry().behaviour(skill)
     recordings = demonstrations_of(demonstrations)
-    document = source.learned(kind, recordings, options)
+    document = file.learned(kind, recordings, options)
     for text in suspicions(recordings):
         warnings.warn(text, SkillframeWarning, stacklevel=3)
     return LearnedSkill(document=document, name=skill)
@@ -205,16 +181,16 @@ def segment(
     set_boundary: Sequence[str] = (), at: str | None = None, hand: str | None = None, axes: str = "base",
     **settings: Any,
 ) -> LearnedSkill:  # fmt: skip
-    """Cut demonstrations of a whole task into phases, learn each, and give the policy that runs them in sequence.
+    """Cut demonstrations of a whole task into phases, learn each, and return the policy that runs them in sequence.
 
     Args:
         demonstrations: one or several, as objects or files; each from the free approach to the end of the task.
-        skill: kind of skill that each phase is learned as.
+        skill: kind of skill of each phase.
         phases: number of phases; None finds it.
-        segmenter: how phases are told apart: "wrench_hmm", "pose_hmm", "zvc" or a plug-in's.
+        segmenter: method: "wrench_hmm", "pose_hmm", "zvc" or a plug-in's.
         set_boundary: boundaries to move, "DEMO:NUMBER=SECONDS" each, both counted from 1.
-        at: where each phase is learned, as for `learn`; so are `hand` and `axes`.
-        hand: where the hand held.
+        at: learning point of each phase, as for `learn`; so are `hand` and `axes`.
+        hand: point that the teacher held.
         axes: "base" or "phase_start".
         **settings: of segmenter and learner [SI].
 
@@ -222,7 +198,7 @@ def segment(
         a skill of type "policy"; `document["demonstrations"]` holds the `boundaries` [s] and `labels` of each.
 
     Raises:
-        InputError: a demonstration or a setting cannot be used, or a demonstration shows something else.
+        InputError: a demonstration or a setting cannot be used, or the demonstrations differ in task.
         UnknownName: no such segmenter, kind of skill, frame or setting.
     """
     own = {"segmenter": segmenter, "skill": skill, "phases": phases, "set_boundary": list(set_boundary)}
@@ -234,18 +210,17 @@ def segment_with(demonstrations: Demonstrations, options: LearnOptions) -> Learn
     """As `segment`, for settings of any name. `options.settings` names the `segmenter`."""
     registry().segmenter(options.settings["segmenter"])
     kind = registry().skill("policy")
-    document = source.learned(kind, demonstrations_of(demonstrations), options)
+    document = file.learned(kind, demonstrations_of(demonstrations), options)
     return LearnedSkill(document=document, name=kind.name)
 
 
 def suspicions(demonstrations: Sequence[Demonstration]) -> list[str]:
-    """Sentences about what looks wrong in recordings: from a biased wrench a skill learns the bias."""
-    found = compared(list(demonstrations), [audit(d) for d in demonstrations])
-    return [f"{each.file}: {text}" for each in found for text in each.warnings]
+    """Sentences on suspicious recordings: a skill would learn the bias of a biased wrench."""
+    return [text for audit in registry().records("audit") for text in audit.warnings(demonstrations)]
 
 
 def skill_of(given: Skills) -> LearnedSkill:
-    """A learned skill.
+    """A learned skill from an object, a document or a file.
 
     Raises:
         InputError: it cannot be used. UnknownName: no such kind of skill.

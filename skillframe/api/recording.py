@@ -1,92 +1,104 @@
-"""`record`: demonstrations of a world from a simulated person."""
+"""`record`: demonstrations of a world by a simulated teacher."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any
 
-from skillframe.api.tasks import Robot, Settings, World, robot_of, scene_of
-from skillframe.errors import InputError, UnknownName, extras_named
+from skillframe.api.inputs import Robot, Settings, World, robot_of, scene_of
+from skillframe.config import build
+from skillframe.errors import InputError, extras_named
+from skillframe.extend.drives import drive_of
+from skillframe.extend.reading import Recording
+from skillframe.extend.registry import registry
 from skillframe.robot.model import RobotModel
-from skillframe.teaching import sessions
-from skillframe.teaching.blind import BlindSettings
-from skillframe.teaching.blind_sessions import record_blind
-from skillframe.teaching.sessions import Recording
-from skillframe.teaching.teacher import TeacherSettings
-from skillframe.teaching.teleoperation import OperatorSettings
 from skillframe.world.scene import Scene
 
-Person = TeacherSettings | BlindSettings | OperatorSettings
-REMOTE_DELAY_S, REMOTE_SCALE = 0.1, 2.0
-"""One-way delay and motion scale of a person who teleoperates an arm, where nothing else is said; our choice."""
-TEACHERS = ("blind", "kinesthetic", "teleoperation")
+Person = Any
+"""Settings of a teacher of a plug-in, such as `TeacherSettings` and `BlindSettings`, or of a plug-in's drive."""
+OF_TEACHER = "teacher."
+"""Prefix of a teacher's settings among deviations from the nominal."""
 
 
 def record(
     world: World, robot: Robot = "panda", *, teacher: str | Person | None = None, count: int = 1, seed: int = 0,
-    set: Settings | None = None, rate_hz: float | None = None, progress: Callable[[str], None] | None = None,
-    watch: Callable[[float, float], None] | None = None,
+    set: Settings | None = None, angle: float | None = None, rate_hz: float | None = None,
+    progress: Callable[[str], None] | None = None, watch: Callable[[float, float], None] | None = None,
 ) -> Recording:  # fmt: skip
-    """Record demonstrations of a world from a simulated person.
+    """Record demonstrations of a world by a simulated teacher.
 
-    A demonstration that fails is redrawn and counted. The starts of the world's task are taken in turn, so that
+    A demonstration that fails is sampled again and counted. The starts of the world's task are taken in turn, so that
     `count=2` shows the valley from both sides.
 
     Args:
         world: a name, a fixture file, or a scene of your own.
         robot: a name, a robot.toml or its folder, or a loaded robot.
-        teacher: "kinesthetic", "teleoperation" or "blind" as they are by default, or how the person is in detail:
-            `TeacherSettings`, `BlindSettings` or, for a hydraulic machine, `OperatorSettings`. None: somebody whose
-            hand is on the arm; on a hydraulic machine an operator.
+        teacher: name of a plug-in's teacher with its defaults ("kinesthetic", "teleoperation", "blind",
+            "disassembly"), or settings: `TeacherSettings`, `BlindSettings` or those of a plug-in's drive. None:
+            kinesthetic; on a robot whose drive has teachers of its own, teleoperation.
         count: demonstrations wanted.
-        seed: everything random follows from it.
-        set: what differs from the nominal, {"start.tilt_y": "5deg", "world.fillet": 8e-4}.
+        seed: of everything random.
+        set: deviations from the nominal, {"start.tilt_y": "5deg", "world.fillet": 8e-4, "teacher.aim_noise": "2deg"}.
+        angle: of the push in the plane of a machine [rad], -pi/2 straight down; None for the world's direction.
         rate_hz: sample rate; None for 500, of machines 100.
-        progress: told in words what happens.
+        progress: receives messages.
         watch: called with seconds simulated and the longest duration.
 
     Raises:
         InputError: the teacher does not suit robot or world, or a setting cannot be used.
         UnknownName: no such world, robot, teacher or setting.
-        SkillframeError: a demonstration still fails after 20 attempts; says with what.
+        SkillframeError: a demonstration still fails after 20 attempts; gives the reason.
     """
-    scene, draws = scene_of(world, set, depth=2)
+    given = dict(set or {})
+    of_teacher = {key.removeprefix(OF_TEACHER): given.pop(key) for key in [*given] if key.startswith(OF_TEACHER)}
+    scene, draws = scene_of(world, given, depth=2)
     model = robot_of(robot)
-    person = _person(teacher, model, scene)
+    own = drive_of(model.spec)
+    person = _with(_person(teacher, model, scene), of_teacher)
+    if angle is not None:
+        if own is None or own.aimed is None:
+            text = f"is for machines that are taught by an operator, and {model.spec.name} is not"
+            raise InputError("angle", text, "leave it out")
+        scene = own.aimed(model, scene, angle)
     common: dict[str, Any] = {"count": count, "seed": seed, "draws": draws, "progress": progress, "watch": watch}
     common |= {} if rate_hz is None else {"rate_hz": rate_hz}
-    if isinstance(person, OperatorSettings):
+    if own is not None and own.teach is not None:
         with extras_named():
-            from skillframe.teaching.machine_sessions import record_operated  # needs casadi, which arms do without
-
-        return record_operated(model, scene, person, **common)
-    if isinstance(person, BlindSettings):
-        return record_blind(model, scene, person, **common)
-    return sessions.record(model, scene, person, **common)
+            recording: Recording = own.teach(model, scene, person, **common)
+        return recording
+    name = teacher if isinstance(teacher, str) else person.kind
+    shown: Recording = registry().teacher(name).record(model, scene, person, **common)
+    return shown
 
 
 def _person(teacher: str | Person | None, robot: RobotModel, scene: Scene) -> Person:
-    """The person in detail, and one who can teach this robot."""
-    machine, name = robot.spec.hydraulic, robot.spec.name
-    if isinstance(teacher, str) and teacher not in TEACHERS:
-        raise UnknownName("teacher", teacher, TEACHERS)
-    if teacher is None or isinstance(teacher, str):
-        person = OperatorSettings() if machine and teacher in (None, "teleoperation") else seeing(teacher, scene)
-    else:
-        person = teacher
-    if machine and not isinstance(person, OperatorSettings):
-        raise InputError(
-            f"teacher {person.kind}", f"nobody leads {name} by hand, it is a hydraulic machine", "use teleoperation"
-        )
-    if isinstance(person, OperatorSettings) and not machine:
-        raise InputError("OperatorSettings", f"are for hydraulic machines, which {name} is not", "use TeacherSettings")
+    if isinstance(teacher, str):
+        registry().teacher(teacher)
+    own = drive_of(robot.spec)
+    if own is not None and own.teacher is not None and teacher in (None, "teleoperation"):
+        return own.teacher()
+    person: Person = seeing(teacher, scene) if teacher is None or isinstance(teacher, str) else teacher
+    by_hand = isinstance(person, tuple(type(record.usual(scene)) for record in registry().records("teacher")))
+    if own is not None and own.teacher is not None and by_hand:
+        text = f"nobody leads {robot.spec.name} by hand, it is a {own.name} machine"
+        raise InputError(f"teacher {person.kind}", text, "use teleoperation")
+    if (own is None or own.teacher is None) and not by_hand:
+        text = f"are for the drive of a plug-in, which {robot.spec.name} does not have"
+        raise InputError(type(person).__name__, text, "use TeacherSettings")
     return person
 
 
-def seeing(teacher: str | None, scene: Scene) -> TeacherSettings | BlindSettings:
-    """The person of a name as by default. One who is blindfolded believes what the world's task says."""
-    if teacher == "blind":
-        return BlindSettings(believed=scene.task.believed)
-    if teacher == "teleoperation":
-        return TeacherSettings(kind="teleoperation", delay_s=REMOTE_DELAY_S, scale=REMOTE_SCALE)
-    return TeacherSettings()
+def _with(person: Person, settings: Mapping[str, Any]) -> Person:
+    """A teacher with some settings changed, given as numbers in SI or as texts with a unit."""
+    if not settings:
+        return person
+    if "kind" in settings:
+        raise InputError("--set teacher.kind", "is the teacher's", "name the teacher instead")
+    changed = build(type(person), settings, f"--set {OF_TEACHER.removesuffix('.')}")
+    return replace(person, **{name: getattr(changed, name) for name in settings})
+
+
+def seeing(teacher: str | None, scene: Scene) -> Person:
+    """Default settings of a named teacher, or of one with a hand on the robot. Raises `UnknownName`."""
+    return registry().teacher(teacher or "kinesthetic").usual(scene)

@@ -12,7 +12,8 @@ from skillframe.api.inputs import File
 from skillframe.api.running import SingleRun
 from skillframe.errors import InputError
 from skillframe.execution.trace import Trace
-from skillframe.reports.page import write_report
+from skillframe.extend.records import no_progress
+from skillframe.extend.registry import registry
 
 Results = CampaignResults | SingleRun | Trace | File
 
@@ -21,26 +22,26 @@ def report(results: Results | Iterable[Results], out: File = "report.html") -> P
     """Write a report: what was learned, the runs with a 3-D replay, where the skill works, and how to repeat it.
 
     Args:
-        results: campaign results, runs, traces, and the folders and files of these; one or several.
-        out: the HTML file; it needs nothing else.
+        results: campaign results, runs, traces, or their folders and files; one or several.
+        out: the self-contained HTML file.
 
     Returns:
         the file.
 
     Raises:
         InputError: there is nothing to report on, or something cannot be read or written.
+        UnknownName: skillframe-reports, which writes the page, is not installed.
     """
     alone = isinstance(results, CampaignResults | SingleRun | Trace | str | os.PathLike)
     several: Iterable[Results] = [results] if alone else results  # type: ignore[list-item, assignment]
     if not isinstance(several, Iterable):
         raise InputError(f"{results!r:.60}", "is no result", "give runs, campaign results, or their files")
     with TemporaryDirectory() as folder:
-        write_report(list(_files(several, Path(folder))), Path(out))
+        registry().output("report").write(list(_files(several, Path(folder))), Path(out), no_progress)
     return Path(out)
 
 
 def _files(results: Iterable[Results], folder: Path) -> Iterator[Path]:
-    """The folder or file of each. A run in memory is written for as long as the report is made."""
     for number, each in enumerate(results, start=1):
         if isinstance(each, CampaignResults):
             yield each.folder

@@ -1,4 +1,4 @@
-"""`run` and `SingleRun`: one run of a skill in a world, and what became of it."""
+"""`run` and `SingleRun`: one run of a skill in a world, and its outcome."""
 
 from __future__ import annotations
 
@@ -7,32 +7,29 @@ import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from skillframe.api.inputs import File
+from skillframe.api.inputs import File, Robot, Settings, World, robot_of, scene_of
 from skillframe.api.learning import LearnedSkill, Skills, skill_of
-from skillframe.api.tasks import Robot, Settings, World, robot_of, scene_of
-from skillframe.config.of_runs import DURATION, TRACE_RATE
-from skillframe.demonstration.places import load_places
+from skillframe.config.units import DURATION, TRACE_RATE
 from skillframe.demonstration.record import resolve_point
-from skillframe.errors import InputError, SkillframeError
-from skillframe.execution.arms import ArmsResult
-from skillframe.execution.executor import Setup, simulate
-from skillframe.execution.prepare import drive_maker, prepare
-from skillframe.execution.scores import ScoreFailed, about, score_notes, scores_of
-from skillframe.execution.trace import Trace
-from skillframe.files import write_whole
-from skillframe.robot.guesses import guess_note
+from skillframe.document.frame import load_places
+from skillframe.errors import SkillframeError, UnknownName
+from skillframe.execution.executor import Setup, require_starts, simulate
+from skillframe.execution.prepare import prepare
+from skillframe.execution.result import ArmsResult
+from skillframe.execution.trace import ScoreFailed, Trace, about, score_notes, scores_of
+from skillframe.extend.records import Moment, no_progress
+from skillframe.extend.registry import registry
+from skillframe.robot.audit import resistance_note
+from skillframe.robot.link_checks import guess_note
 from skillframe.robot.model import RobotModel
-from skillframe.robot.resistance import resistance_note
 from skillframe.skill import Skill
 from skillframe.world.scene import Scene
 
-LONGEST_S, RATE_HZ = DURATION.default, TRACE_RATE.default
-"""Longest run [s] and rate of the trace [Hz] where nothing else is said; our choice."""
-PICTURE = (960, 720)
+LONGEST_S, RATE_HZ = DURATION.nominal, TRACE_RATE.nominal
+"""Default longest run [s] and rate of the trace [Hz]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False, eq=False)
@@ -41,9 +38,9 @@ class SingleRun:
 
     Attributes:
         trace: everything over time, and in `meta` the outcome and the scene's geometry.
-        arms: of a run with two arms, every arm's trace by its name; else empty.
-        interrupted: Ctrl-C came before the end.
-        unscored: the error of a score that failed; the run itself is whole.
+        arms: traces of several arms by name, otherwise empty.
+        interrupted: whether Ctrl-C came before the end.
+        unscored: the error of a score that failed; the run itself is complete.
     """
 
     trace: Trace
@@ -67,7 +64,7 @@ class SingleRun:
 
     @property
     def failure(self) -> str:
-        """Why not, in words. "" for a success."""
+        """Why it failed, in words. "" for a success."""
         return str(self.trace.meta["failure"])
 
     @property
@@ -82,7 +79,7 @@ class SingleRun:
 
     @property
     def peak_force_n(self) -> float:
-        """Peak contact force [N]: the largest of one control tick in the simulator."""
+        """Peak contact force [N]: the largest of one control tick in simulation."""
         return float(self.trace.meta["peak_force_n"])
 
     @property
@@ -97,16 +94,16 @@ class SingleRun:
 
     @property
     def scores(self) -> dict[str, float | None]:
-        """The scores that were asked for, by name, in SI units. None where this run has no such figure."""
+        """The requested scores by name, in SI units. None where this run has no such figure."""
         return {name: about["value"] for name, about in (self.trace.meta.get("scores") or {}).items() if about}
 
     @property
     def events(self) -> list[tuple[float, str]]:
-        """What happened when [s], in words: phases that began, parts that failed."""
+        """Time [s] and text of events: phases that began, parts that failed."""
         return [(float(when), str(what)) for when, what in self.trace.meta.get("events") or []]
 
     def save(self, path: File) -> SingleRun:
-        """Write the trace (.npz), whole or not at all.
+        """Write the trace (.npz) as a whole.
 
         Raises:
             InputError: the file cannot be written.
@@ -114,18 +111,30 @@ class SingleRun:
         self.trace.save(Path(path))
         return self
 
-    def replay(self, out: File) -> Path:
-        """Write a page with a 3-D replay and plots (.html).
+    def write(self, output: str, out: File, progress: Callable[[float, float], None] | None = None) -> str:
+        """Write a file of a kind that a plug-in provides: an option of `skillframe run`, such as "replay" or "video".
+
+        Args:
+            output: the kind.
+            out: the file.
+            progress: called with the amount done and the total.
+
+        Returns:
+            a note on how it was made, or "".
 
         Raises:
-            InputError: the file cannot be written.
+            UnknownName: no plug-in provides that kind.
+            InputError: the file's name is not one of that kind, or it cannot be written.
         """
-        from skillframe.reports.page import write_report
+        record = registry().output(output)
+        if record.of != "run":
+            known = [each.name for each in registry().records("output") if each.of == "run"]
+            raise UnknownName("output of a run", output, known)
+        return record.write(self.trace, Path(out), progress or no_progress)
 
-        with TemporaryDirectory() as folder:
-            file = Path(folder) / f"{Path(out).stem}.npz"
-            self.trace.save(file)
-            write_report([file], Path(out))
+    def replay(self, out: File) -> Path:
+        """Write a page with a 3-D replay and plots (.html). Raises as `write`."""
+        self.write("replay", out)
         return Path(out)
 
     def video(self, out: File, progress: Callable[[float, float], None] | None = None) -> Path:
@@ -133,14 +142,12 @@ class SingleRun:
 
         Args:
             out: the file.
-            progress: called after each frame with how many of how many are done.
+            progress: called after each frame with frames done and in total.
 
         Raises:
-            InputError: the file's name is not one of a video, or it cannot be written.
+            InputError, UnknownName: as `write`.
         """
-        from skillframe.reports.video import write_film
-
-        write_film(self.trace, Path(out), progress or (lambda done, total: None))
+        self.write("video", out, progress)
         return Path(out)
 
     def picture(self, out: File, time: float | None = None, *, far: bool = False) -> Path:
@@ -149,30 +156,19 @@ class SingleRun:
         Args:
             out: the file.
             time: of the run [s]; None for its end.
-            far: the whole scene instead.
+            far: show the whole scene instead.
 
         Raises:
             InputError: the trace holds no geometry, or the file cannot be written.
+            UnknownName: skillframe-reports, which draws it, is not installed.
         """
-        from skillframe.reports.raster import over_paper, png
-        from skillframe.reports.runs import still
-        from skillframe.reports.stage import stage_of
-
-        stage = stage_of(self.trace)
-        if stage is None:
-            raise InputError(out, "cannot be drawn: the trace holds no geometry", "run again")
-        last = len(self.trace.time) - 1
-        frame = last if time is None else min(int(np.searchsorted(self.trace.time, time)), last)
-        image = over_paper(still(stage, frame, stage.far if far else stage.close, *PICTURE))
-        write_whole(Path(out), png(np.concatenate([image, np.full((*image.shape[:2], 1), 255, np.uint8)], axis=-1)))
+        registry().output("still").write(Moment(self.trace, time, far), Path(out), no_progress)
         return Path(out)
 
     def __repr__(self) -> str:
         meta, said = self.trace.meta, "success" if self.success else f"failure: {self.failure}"
         what = f"{meta.get('skill')} by {meta['robot']} in {meta['world']}"
-        return (
-            f"SingleRun({what}: {said}; {self.duration_s:.2f} s, peak force in the simulator {self.peak_force_n:.1f} N)"
-        )
+        return f"SingleRun({what}: {said}; {self.duration_s:.2f} s, peak force in simulation {self.peak_force_n:.1f} N)"
 
 
 def run(
@@ -184,20 +180,20 @@ def run(
     """Run a skill once in a simulated world.
 
     Args:
-        skill: what `learn` gave, a skill file, "TYPE:DEMONSTRATION", a document, or an object that steps itself.
+        skill: a result of `learn`, a skill file, "TYPE:DEMONSTRATION", a document, or a runnable `Skill`.
         world: a name, a fixture file, or a scene of your own.
         robot: a name, a robot.toml or its folder, or a loaded robot.
         coc: centre of compliance, "x,y,z" [m] in the tool frame or a frame's name; None as learned.
-        set: what differs from the nominal, {"start.offset_x": 0.008, "fixture.tilt_y": "5deg"}.
+        set: deviations from the nominal, {"start.offset_x": 0.008, "fixture.tilt_y": "5deg"}.
         seed: of the sensor noise.
         duration_s: longest run [simulated s].
         rate_hz: of the trace.
         scores: names of figures that plug-ins compute from the trace.
         progress: called with seconds simulated and the longest duration.
-        places: TOML file with poses of places in base, for a skill that goes by places; None: as the world says.
+        places: TOML file with poses of places in base, for a skill that uses places; None: those of the world.
 
     Raises:
-        SkillframeError: something given cannot be used, or a score failed; says what, where, and what to do.
+        SkillframeError: an argument cannot be used, or a score failed; says what, where, and what to do.
         KeyboardInterrupt: Ctrl-C.
     """
     done = once(
@@ -216,9 +212,9 @@ def once(
     duration_s: float, rate_hz: float, scores: Sequence[str], progress: Callable[[float, float], None] | None,
     places: File | None = None,
 ) -> SingleRun:  # fmt: skip
-    """As `run`, but a run that Ctrl-C ended, or whose scores failed, is given back as it stood."""
+    """As `run`, but returns also a run that Ctrl-C ended, or whose scores failed."""
     for each in scores:
-        about(each)  # an unknown one is told before the run
+        about(each)  # refuse an unknown one before the run
     scene, draws = scene_of(world, set, depth=3)
     own = skill if isinstance(skill, Skill) else None
     learned = None if isinstance(skill, Skill) else skill_of(skill)
@@ -234,6 +230,7 @@ def once(
         duration_s=duration_s, trace_hz=rate_hz,
         progress=None if progress is None else lambda now: progress(now, duration_s),
     )  # fmt: skip
+    require_starts(result.ended_by, result.reason)
     assert result.traces is not None
     trace = result.traces[0]
     name = type(skill).__name__ if learned is None else learned.name
@@ -250,7 +247,7 @@ def once(
 
 
 def _score(trace: Trace, names: Sequence[str]) -> SkillframeError | None:
-    """Put the scores into the trace's metadata. The error of one that fails."""
+    """Store the scores in the trace's metadata. Returns the error of one that fails."""
     if names:
         try:
             trace.meta["scores"] = score_notes(scores_of(trace, names))
@@ -260,16 +257,15 @@ def _score(trace: Trace, names: Sequence[str]) -> SkillframeError | None:
 
 
 def _setup(robot: RobotModel, scene: Scene, coc: str | None) -> Setup:
-    """The set-up of a skill that steps itself. It says nothing of where it was learned."""
     center = resolve_point(coc, scene.tool.frames)
-    return Setup(robot=robot, scene=scene, center_of_compliance=center, make_drive=drive_maker(robot))
+    return Setup(robot=robot, scene=scene, center_of_compliance=center)
 
 
 def _command(
     skill: LearnedSkill, world: World, robot: Robot, coc: str | None, settings: Settings | None, seed: int,
     duration_s: float, rate_hz: float, scores: Sequence[str], places: File | None,
 ) -> str:  # fmt: skip
-    """What to type to get the same run again, without where it goes. "" where objects of Python cannot be typed."""
+    """The command that repeats the run, without its output. "" where Python objects cannot be typed."""
     named = robot if isinstance(robot, str | os.PathLike) else None
     if skill.source is None or named is None or isinstance(world, Scene):
         return ""

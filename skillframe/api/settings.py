@@ -1,60 +1,54 @@
-"""What can be set of a trial and of a world, and which bare numbers look like millimetres or degrees."""
+"""Settings of trials and worlds, and warnings for bare numbers that look like millimetres or degrees."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import is_dataclass
-from math import isnan
 from typing import Any, get_args, get_type_hints
 
-from skillframe.config.fields import settings_of, texts
-from skillframe.config.of_runs import OF_RUNS
-from skillframe.config.units import doubt
+from skillframe.config import settings_of, texts
+from skillframe.config.units import OF_RUNS, Quantity, doubt
+from skillframe.extend.drives import of_world, quantities
 from skillframe.extend.records import WorldType
 from skillframe.extend.registry import registry
 from skillframe.robot.spec import RobotFile, RobotSpec
-from skillframe.world.quantities import VARIED
+
+
+def row_of(each: Quantity, world: str | None = None) -> dict[str, Any]:
+    """A quantity as plain values: `name`, `world`, `unit`, `default`, `about`, `range`, `why`, and an `option`."""
+    limits = each.range
+    return {
+        "name": each.name, "world": world, "unit": each.unit, "default": each.nominal, "about": each.about,
+        "range": limits and limits[:2], "why": limits.why if limits else "",
+        **({"option": each.option} if each.option else {}),
+    }  # fmt: skip
 
 
 def of_trials() -> Iterator[dict[str, Any]]:
-    """Rows of what can differ between trials: `name`, `world` (None), `unit`, `default`, `about`, `range`, `why`."""
-    for each in VARIED:
-        limits = each.range
-        yield {
-            "name": each.name, "world": None, "unit": each.unit, "default": each.nominal, "about": each.about,
-            "range": None if limits is None else limits[:2], "why": "" if limits is None else limits.why,
-        }  # fmt: skip
+    """Quantities of runs, with their `option` of `skillframe run`, and of trials."""
+    yield from (row_of(each) for each in (*OF_RUNS, *quantities().values()))
 
 
-def of_runs() -> Iterator[dict[str, Any]]:
-    """Rows of what holds for a whole run or campaign, with its `option` of `skillframe run`."""
-    for each in OF_RUNS:
-        default = None if isnan(each.default) else each.default
-        yield {
-            "name": each.name, "world": None, "unit": each.unit, "default": default,
-            "about": each.about, "range": each.range[:2], "why": each.range.why, "option": each.option,
-        }  # fmt: skip
-
-
-def of_world(record: WorldType) -> Iterator[dict[str, Any]]:
-    """Rows of a world's own parameters."""
-    for each in settings_of(record.params):
-        yield {**each, "name": f"world.{each['name']}", "world": record.name}
+def settings_of_world(record: WorldType) -> Iterator[dict[str, Any]]:
+    """A world's parameters."""
+    yield from (row_of(each, record.name) for each in of_world(record.params).values())
 
 
 def of_robot() -> Iterator[dict[str, Any]]:
-    """Rows of the keys of robot.toml: "control.rate_hz", "home.NAME" in a table by names, "arm[].name" in a list.
+    """Keys of robot.toml: "control.rate_hz", "home.NAME" in a table by names, "arm[].name" in a list.
 
-    Each with `name`, `world` (None), `unit`, `default`, `about` and `range`, as of trials. A unit that nobody types
-    stands in the text alone.
+    Each with `name`, `world` (None), `unit`, `default`, `about` and `range`, as of trials. The text alone holds a unit
+    that nobody types.
     """
-    said = texts(RobotSpec)  # word for word the same fields, and described there
-    for row in _keys(RobotFile, ""):
+    said = texts(RobotSpec)  # has the same fields, with descriptions
+    tables = [record.tables() for record in registry().records("drive") if record.tables is not None]
+    of_drives = (row for table in tables for name, kind in table.items() for row in _keys(kind, f"{name}."))
+    for row in (*_keys(RobotFile, ""), *of_drives):
         yield {**row, "about": row["about"] or said.get(row["name"].removesuffix(".NAME"), ""), "world": None}
 
 
 def _keys(kind: type, group: str) -> Iterator[dict[str, Any]]:
-    """Rows of a record and of the records in it. `group` is what stands before its keys."""
+    """Fields of a dataclass and of those in it. `group` is the prefix of their keys."""
     hints = get_type_hints(kind)
     for row in settings_of(kind):
         hint, name = hints[row["name"]], f"{group}{row['name']}"
@@ -69,8 +63,8 @@ def _keys(kind: type, group: str) -> Iterator[dict[str, Any]]:
 
 
 def doubts(world: str, settings: Mapping[str, Any]) -> list[str]:
-    """Sentences about bare numbers that look like millimetres or degrees."""
-    rows = {row["name"]: row for row in [*of_trials(), *of_world(registry().world(world))]}
-    known = [(key, value, rows[key]) for key, value in settings.items() if key in rows]
-    found = [doubt(key, value, row["unit"], row["default"]) for key, value, row in known]
+    """Sentences on bare numbers that look like millimetres or degrees."""
+    known = quantities(registry().world(world).params)
+    rows = [(key, value, known[key]) for key, value in settings.items() if key in known]
+    found = [doubt(key, value, quantity.unit, quantity.nominal) for key, value, quantity in rows]
     return [text for text in found if text]

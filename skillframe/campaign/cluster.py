@@ -1,12 +1,8 @@
-"""Jobs on other processes or machines through Dask `distributed`: the same engine locally and on a cluster.
+"""Jobs on local or remote workers through Dask `distributed`.
 
-Measured settings: no task is retried on another worker (`allowed-failures` 0, the driver decides), one thread per
-worker, no dashboard, memory limited so that a hog is ended and not the machine. A local scheduler listens on 127.0.0.1
-only, and speaks TLS with a key that is made for it and kept in memory, so that nobody else on the machine can hand it
-code. Dask never notices a hang, so each job carries a watchdog (`worker`); a hang thus becomes a death like any other.
-
-A job is sent to one worker by name, and a worker has one job at a time. So a worker's death is its own job's, and
-trouble of the environment on one worker sets that worker aside and sends the job to another.
+Dask retries no task (`allowed-failures` 0; the driver decides). A worker has one thread and one job at a time, sent to
+it by name, so its death is that of its job. A local scheduler listens on 127.0.0.1 with a temporary TLS key, since it
+executes code. Dask does not notice a hang: a watchdog (`worker`) ends the worker.
 """
 
 from __future__ import annotations
@@ -26,31 +22,28 @@ from pathlib import Path
 from typing import Any, Generic
 
 from skillframe.campaign.crew import Crew, SchedulerError
-from skillframe.campaign.driver import Answer, Died, Raised
-from skillframe.campaign.identity import Identity
+from skillframe.campaign.driver import Answer, Died, Raised, is_trouble, said
+from skillframe.campaign.jobs import WorkT
+from skillframe.campaign.provenance import Identity
 from skillframe.campaign.rows import Row
-from skillframe.campaign.trouble import is_trouble, said
-from skillframe.campaign.work import WorkT
 from skillframe.campaign.worker import guarded, share_file
 from skillframe.errors import InputError
 
 THREADS = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 CONNECT_S = 30.0
-SOON_S, LOOK_S, TELL_S = 0.01, 0.1, 1.0
+LOOK_S, TELL_S = 0.1, 1.0
 GONE_S = 5.0
-"""Wall time after which a job whose worker is gone is given up, should Dask not say so itself."""
-TRIES = 3
-"""Workers on which a job meets trouble of the environment before the campaign stops."""
+"""Wall time after which a job whose worker is gone is given up."""
 _MEMORY_LOGGER = "distributed.nanny.memory"
 _SETTINGS = {
     "distributed.scheduler.allowed-failures": 0,
-    "distributed.worker.profile.enabled": False,  # a hundred looks a second at what a worker runs, which nobody reads
-    "distributed.admin.tick.interval": "1s",  # as often it is looked how late an event loop is
+    "distributed.worker.profile.enabled": False,  # sampling of stacks, 100 Hz by default, which nothing here reads
+    "distributed.admin.tick.interval": "1s",  # interval of measuring the event loop's delay
 }
 
 
 class _MemoryDeaths(logging.Handler):
-    """Remembers which workers Dask ended for their memory, from what it logs."""
+    """Remembers from Dask's log which workers were ended for their memory."""
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
@@ -65,7 +58,7 @@ class _MemoryDeaths(logging.Handler):
 
 @dataclass(slots=True, kw_only=True)
 class _Task(Generic[WorkT]):
-    """A job on its way: the workers it met trouble on, and where it runs now."""
+    """A job, the workers that it had trouble on, and where it runs now."""
 
     job: WorkT
     tried: set[str] = field(default_factory=set)
@@ -78,20 +71,20 @@ class ClusterPool(Generic[WorkT]):
     """A pool of Dask workers, one job each.
 
     Args:
-        evaluate: importable in the workers.
-        seconds: wall time that a job may take without progress; infinite: for ever.
-        workers: number of local processes, where no scheduler is given.
+        evaluate: function that the workers can import.
+        seconds: wall time that a job may take without progress; may be infinite.
+        workers: number of local processes, without `scheduler`.
         scheduler: address of a running scheduler, whose workers see `watch` under the same path.
-        memory_bytes: limit per local worker; None shares the machine's memory between them and this process.
-        watch: folder for the workers' files, seen by all of them: made here, and removed at the end.
-        ours: what this process is; workers must be the same.
-        needed: distributions of plug-ins that the workers must have.
-        tell: told now and then how many rows' worth of the jobs in flight is done.
-        note: told, in a sentence, of workers that get no work.
+        memory_bytes: limit per local worker; None divides the machine's.
+        watch: folder for the workers' files; created here, removed at the end.
+        ours: identity that workers must match.
+        needed: distributions of plug-ins that workers must have.
+        tell: receives how many rows' worth of the jobs in flight is done.
+        note: receives a sentence about each refused worker.
 
     Raises:
         SchedulerError: the scheduler does not answer or has no worker.
-        InputError: something else lies where the workers' files belong.
+        InputError: `watch` is not a folder of workers.
     """
 
     def __init__(
@@ -100,14 +93,32 @@ class ClusterPool(Generic[WorkT]):
         memory_bytes: int | None = None,
     ) -> None:  # fmt: skip
         import dask
-        import distributed  # noqa: F401  its defaults must be there before one of them is set, and set back
+        import distributed  # noqa: F401  its defaults must exist before one is overridden and restored
 
         self._evaluate, self._seconds, self._watch, self._tell = evaluate, seconds, watch, tell
         self.ran_on: Mapping[str, str] = ours.environment
         self._stack = ExitStack()
         try:
-            self._make_room()
-            self._memory = self._listen()
+            if not self._watch.is_symlink():
+                shutil.rmtree(self._watch, ignore_errors=True)
+            try:
+                self._watch.mkdir(mode=0o700)
+            except FileExistsError:
+                raise InputError(self._watch, "is not a folder of workers", "delete it") from None
+            self._stack.callback(shutil.rmtree, self._watch, ignore_errors=True)
+            handler, logger = _MemoryDeaths(), logging.getLogger(_MEMORY_LOGGER)
+            before = logger.level, logger.propagate
+            logger.addHandler(handler)
+            logger.setLevel(logging.WARNING)
+            logger.propagate = False
+
+            def restore() -> None:
+                logger.removeHandler(handler)
+                logger.setLevel(before[0])
+                logger.propagate = before[1]
+
+            self._stack.callback(restore)
+            self._memory = handler
             self._stack.enter_context(dask.config.set(_SETTINGS))
             self._client = self._connect(scheduler) if scheduler else self._start(workers, memory_bytes)
         except BaseException:
@@ -122,40 +133,15 @@ class ClusterPool(Generic[WorkT]):
 
     @property
     def size(self) -> int:
-        """How many jobs may be in flight. Before the first look, as many as there are workers."""
+        """How many jobs may be in flight."""
         return self._crew.size if self._crew.present else max(1, self._planned)
-
-    def _make_room(self) -> None:
-        """An empty folder for the workers' files. What a killed session left there goes, and no link is followed."""
-        if not self._watch.is_symlink():
-            shutil.rmtree(self._watch, ignore_errors=True)
-        try:
-            self._watch.mkdir(mode=0o700)
-        except FileExistsError:
-            raise InputError(self._watch, "is not a folder of workers", "delete it") from None
-        self._stack.callback(shutil.rmtree, self._watch, ignore_errors=True)
-
-    def _listen(self) -> _MemoryDeaths:
-        handler, logger = _MemoryDeaths(), logging.getLogger(_MEMORY_LOGGER)
-        before = logger.level, logger.propagate
-        logger.addHandler(handler)
-        logger.setLevel(logging.WARNING)
-        logger.propagate = False
-
-        def restore() -> None:
-            logger.removeHandler(handler)
-            logger.setLevel(before[0])
-            logger.propagate = before[1]
-
-        self._stack.callback(restore)
-        return handler
 
     def _start(self, workers: int, memory_bytes: int | None) -> Any:
         from distributed import Client, LocalCluster
         from distributed.security import Security
         from distributed.system import MEMORY_LIMIT
 
-        # even without a dashboard the scheduler listens for health checks, on port 8787 unless told otherwise
+        # without an address the scheduler's health checks would listen on port 8787
         try:
             cluster = LocalCluster(
                 n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None, host="127.0.0.1",
@@ -184,29 +170,25 @@ class ClusterPool(Generic[WorkT]):
         return client
 
     def submit(self, job: WorkT) -> None:
-        """Send a job to a worker that is free, as soon as there is one."""
+        """Queue a job for the next free worker."""
         self._waiting.append(_Task(job=job))
         self._assign()
 
     def _assign(self) -> None:
-        """Hand waiting jobs to free workers."""
         busy = {task.worker for task in self._flying.values()}
         for address in [a for a in self._crew.usable if a not in busy]:
             open_to = (t for t in self._waiting if address not in t.tried or not self._crew.others(t.tried))
             task = next(open_to, None)
             if task is not None:
                 self._waiting.remove(task)
-                self._send(task, address)
-
-    def _send(self, task: _Task[WorkT], address: str) -> None:
-        task.worker, task.gone_since = address, None
-        task.watch = self._watch / f"job-{next(self._number)}.txt"
-        future = self._client.submit(
-            guarded, self._evaluate, task.job, self._seconds, str(task.watch), pure=False, workers=[address],
-            allow_other_workers=False,
-        )  # fmt: skip
-        self._flying[future] = task
-        future.add_done_callback(lambda _: self._ended.set())
+                task.worker, task.gone_since = address, None
+                task.watch = self._watch / f"job-{next(self._number)}.txt"
+                future = self._client.submit(
+                    guarded, self._evaluate, task.job, self._seconds, str(task.watch), pure=False, workers=[address],
+                    allow_other_workers=False,
+                )  # fmt: skip
+                self._flying[future] = task
+                future.add_done_callback(lambda _: self._ended.set())
 
     def next(self) -> tuple[WorkT, Answer]:
         """Wait for the next job to end."""
@@ -226,7 +208,6 @@ class ClusterPool(Generic[WorkT]):
                 return task.job, answer
 
     def _wait(self) -> Any:
-        """A job's future that has ended. Meanwhile look after the workers, and tell how far those in flight are."""
         due = time.monotonic() + TELL_S
         while True:
             self._ended.clear()
@@ -235,13 +216,13 @@ class ClusterPool(Generic[WorkT]):
                 return ended
             self._crew.look()
             self._assign()
-            self._ended.wait(LOOK_S if self._flying else SOON_S)
+            self._ended.wait(LOOK_S if self._flying else 0.01)
             if time.monotonic() >= due:
                 self._tell(sum(_share(task.watch) * task.job.size for task in self._flying.values()))
                 due = time.monotonic() + TELL_S
 
     def _is_gone(self, task: _Task[WorkT]) -> bool:
-        """Whether a job's worker left some time ago and Dask, told to use no other, waits for it to come back."""
+        """Whether a job's worker has been gone for `GONE_S`. Dask would wait for it to return."""
         if task.worker in self._crew.present:
             task.gone_since = None
             return False
@@ -249,7 +230,7 @@ class ClusterPool(Generic[WorkT]):
         return time.monotonic() - task.gone_since > GONE_S
 
     def _answer(self, future: Any, task: _Task[WorkT]) -> Answer | None:
-        """What became of a job. None if its worker left before it began, or with the rows before they were fetched."""
+        """The answer of a job. None if its worker left before it began, or before its rows were fetched."""
         from distributed import KilledWorker
         from distributed.client import FutureCancelledError
 
@@ -257,53 +238,44 @@ class ClusterPool(Generic[WorkT]):
             future.cancel()
             self._crew.lost(task.worker)
             return Died("killed") if task.watch.exists() else None
-        # not future.result(): interrupted there, Dask cancels half a gather and logs what its other half then raises
+        # future.result(), when interrupted, makes Dask cancel half a gather and log the errors of the other half
         gathered = asyncio.run_coroutine_threadsafe(
             self._client.gather(future, asynchronous=True), self._client.loop.asyncio_loop
         )
         try:
-            if not self._fetched(gathered, task):
-                gathered.cancel()
-                future.cancel()
-                return None
+            while not wait([gathered], timeout=LOOK_S).done:
+                self._crew.look()
+                if self._is_gone(task):  # no other worker may compute the rows again
+                    gathered.cancel()
+                    future.cancel()
+                    return None
             answer: list[Row] | Raised = gathered.result()
         except KilledWorker as error:
             self._crew.lost(task.worker)
-            return Died(self._cause(error.last_worker.address, task.watch))
-        except FutureCancelledError as error:  # the scheduler itself is gone
+            if task.watch.exists() and "Timeout (" in task.watch.read_text(encoding="utf-8", errors="replace"):
+                return Died("time limit")
+            return Died("memory" if self._memory.has(error.last_worker.address) else "killed")
+        except FutureCancelledError as error:  # the scheduler is gone
             raise SchedulerError(f"the scheduler was lost ({error}); finished rows are kept, resume to go on") from None
-        except Exception as error:  # outside a trial: the worker cannot import what it was sent, a row cannot be sent
+        except Exception as error:  # outside a trial: the worker cannot import the job, or a row cannot be sent
             return Raised(f"{said(error)} (worker {task.worker})", trouble=is_trouble(error))
         self.ran_on = self._crew.usable.get(task.worker, self.ran_on)
         if isinstance(answer, Raised) and answer.trouble:
             return answer._replace(text=f"{answer.text} (worker {task.worker})")
         return answer
 
-    def _fetched(self, gathered: Any, task: _Task[WorkT]) -> bool:
-        """Wait for rows on their way. False if their worker died with them, for no other worker may make them again."""
-        while not wait([gathered], timeout=LOOK_S).done:
-            self._crew.look()
-            if self._is_gone(task):
-                return False
-        return True
-
     def _goes_elsewhere(self, task: _Task[WorkT], answer: Answer) -> bool:
-        """Whether trouble of the environment sends a job to another worker. The one that had it gets no more work."""
+        """Whether a job with trouble of the environment goes to another worker. Its worker is set aside."""
         if not isinstance(answer, Raised) or not answer.trouble or (answer.memory and task.job.size > 1):
             return False
         task.tried.add(task.worker)
-        if len(task.tried) >= TRIES or not self._crew.others(task.tried):
+        if len(task.tried) >= 3 or not self._crew.others(task.tried):
             return False
         self._crew.set_aside(task.worker, answer.text)
         return True
 
-    def _cause(self, address: str, watch: Path) -> str:
-        if watch.exists() and "Timeout (" in watch.read_text(encoding="utf-8", errors="replace"):
-            return "time limit"
-        return "memory" if self._memory.has(address) else "killed"
-
     def close(self) -> None:
-        """End all jobs and, where they are ours, the workers."""
+        """Cancel all jobs, and end the workers that this process started."""
         for future in list(self._flying):
             future.cancel()
         self._crew.close()
@@ -311,7 +283,6 @@ class ClusterPool(Generic[WorkT]):
 
 
 def _share(watch: Path) -> float:
-    """How far a job says that it is. Nothing said yet, or half a number, is no progress."""
     try:
         return float(share_file(watch).read_text(encoding="utf-8"))
     except (OSError, ValueError):

@@ -1,43 +1,58 @@
-"""Gets every trial's row out of workers that may die: halve what fails, and never blame the innocent.
+"""Gets each trial's row from workers that may die.
 
-A chunk whose worker died is halved. A single trial whose worker died is only a suspect, for whatever killed the worker
-may have come from outside; suspects are run again at the end, one by one with nothing else in flight, and one that dies
-then is recorded as the reason. A trial that raises is known for certain and recorded at once, unless what it raised is
-trouble of the environment (`trouble`): then nothing is recorded, and the campaign stops.
+A chunk whose worker died is halved. A single trial whose worker died runs again at the end, alone, since the cause may
+lie outside; a second death is its result. A trial that raises gets a row at once, except for trouble of the environment
+(`trouble`), which stops the campaign.
+
+Workers reused by several short campaigns, since starting workers takes as long as such a campaign.
+
+Distinguishes errors of a skill from trouble of the environment, of which no row is written.
+
+Trouble of the environment is
+
+  MemoryError, OSError, ImportError                       wherever raised, also in a plug-in's step
+  UnknownName, MissingDependency, plug-in load errors,    wherever raised: a name that existed when the campaign was
+  CompilerFailed                                          prepared is missing in this process
+  InputError of files                                     raised while an FMU is found, unpacked or built
+  ScoreFailed                                             a score is no part of the skill
+  anything                                                raised while the robot, the skill or the world is loaded
+                                                          (`needed`), which succeeded before the campaign began
+
+Any other error becomes the trial's row: a ValueError in a skill's step, a start out of reach, a sample that the world
+refuses, an FMU that crashes, `sys.exit` in a skill. The driver judges a worker that dies.
 """
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import TracebackType
 from typing import Generic, NamedTuple, Protocol
 
-from skillframe.campaign.chunk_progress import listening
+from skillframe.campaign.jobs import WorkT, listening
 from skillframe.campaign.provenance import environment
 from skillframe.campaign.rows import ChunkJob, Row
-from skillframe.campaign.trouble import CampaignError, Evaluate, Raised, attempt
-from skillframe.campaign.work import WorkT
+from skillframe.errors import InputError, MissingDependency, SkillframeError, UnknownName, missing_extra
+from skillframe.execution.trace import ScoreFailed
+from skillframe.extend.registry import BadPlugin, PluginConflict
 
 __all__ = ["Answer", "CampaignError", "Died", "Driver", "Evaluate", "InProcess", "Pool", "Raised", "chunk_size"]
 
-HOPELESS = 20
-"""Chunks lost in a row from the very start after which a campaign gives up: the set-up is broken, not a trial."""
 WHY = {"killed": "was killed", "time limit": "made no progress for too long", "memory": "went over its memory limit"}
 
 
 class Died(NamedTuple):
-    """The worker went away under the job. Cause is "killed", "time limit" (it made no progress) or "memory"."""
+    """The worker died. Cause: "killed", "time limit" (no progress) or "memory"."""
 
     cause: str
 
 
-Answer = list[Row] | Died | Raised
-
-
 class Pool(Protocol[WorkT]):
-    """Where jobs run."""
+    """Runs jobs."""
 
     @property
     def size(self) -> int:
@@ -51,10 +66,10 @@ class Pool(Protocol[WorkT]):
         """Start a job."""
 
     def next(self) -> tuple[WorkT, Answer]:
-        """The next job to end, and how. Trouble of the environment only where no other worker is left to try."""
+        """Wait for the next job to end. Returns trouble of the environment only once no other worker is left to try."""
 
     def close(self) -> None:
-        """End everything, including what is in flight."""
+        """End all jobs."""
 
 
 @dataclass(slots=True, kw_only=True)
@@ -62,14 +77,15 @@ class Driver:
     """Runs chunks through a pool.
 
     Attributes:
-        pool: where.
-        keep: what to do with the rows of a chunk that ended.
-        lost: the row of a trial that left none, from its job and the reason.
-        enough: asked before each chunk; True starts no more.
-        wanted: asked of each chunk before it starts; False leaves it out.
-        words: a job in words, for sentences.
-        tell: told when a worker was replaced, and why.
-        fix: what to type once trouble of the environment is over.
+        pool: runs the jobs.
+        keep: stores rows.
+        lost: makes the row of a trial that left none, from its job and the reason.
+        enough: True starts no more chunks.
+        wanted: False skips a chunk.
+        words: describes a job.
+        noted: called first with each job that left no rows, and why.
+        tell: receives a sentence about each replaced worker.
+        fix: command to type after trouble of the environment.
     """
 
     pool: Pool[ChunkJob]
@@ -78,6 +94,7 @@ class Driver:
     enough: Callable[[], bool]
     wanted: Callable[[ChunkJob], bool]
     words: Callable[[ChunkJob], str]
+    noted: Callable[[ChunkJob, str], None]
     tell: Callable[[str], None]
     fix: str
     _good: bool = False
@@ -87,7 +104,7 @@ class Driver:
         """Run all jobs.
 
         Raises:
-            CampaignError: nothing but losses from the start, or trouble of the environment.
+            CampaignError: only losses from the start, or trouble of the environment.
         """
         source, queue, suspects, flying = iter(jobs), deque[ChunkJob](), list[ChunkJob](), 0
         while True:
@@ -106,36 +123,37 @@ class Driver:
         for job in suspects:
             if self.wanted(job) and not self.enough():
                 self.pool.submit(job)
-                self._judge(*self.pool.next())
+                last, answer = self.pool.next()
+                if isinstance(answer, list):
+                    self._store(answer)
+                    continue
+                reason = reason_of(answer)
+                self.noted(last, reason)
+                if isinstance(answer, Raised) and answer.trouble:
+                    raise self._stopped(last, answer)
+                self.tell(f"{self.words(last)} ran again alone, and this is its row now: {reason}")
+                self.keep([self.lost(last, reason)])
 
     def _handle(self, job: ChunkJob, answer: Answer, queue: deque[ChunkJob], suspects: list[ChunkJob]) -> None:
         if isinstance(answer, list):
             self._store(answer)
             return
+        self.noted(job, reason_of(answer))
         several = len(job.trials) > 1
         if isinstance(answer, Died):
             again = "they run again, in halves" if several else "it runs again at the end, alone"
             self.tell(f"a worker was replaced: it {WHY[answer.cause]} while on {self.words(job)}; {again}")
         elif answer.trouble and not (answer.memory and several):
             raise self._stopped(job, answer)
-        self._count_loss(answer)
+        self._losses += 1
+        if not self._good and self._losses >= 20:  # the set-up is broken
+            raise CampaignError(f"no trial ran, {self._losses} chunks were lost: {reason_of(answer)}")
         if several:
             queue.extendleft(reversed(halves(job)))
         elif isinstance(answer, Died):
             suspects.append(job)
         else:
             self.keep([self.lost(job, reason_of(answer))])
-
-    def _judge(self, job: ChunkJob, answer: Answer) -> None:
-        """The last word on a suspect that ran alone."""
-        if isinstance(answer, list):
-            self._store(answer)
-            return
-        if isinstance(answer, Raised) and answer.trouble:
-            raise self._stopped(job, answer)
-        reason = reason_of(answer)
-        self.tell(f"{self.words(job)} ran again alone, and this is its row now: {reason}")
-        self.keep([self.lost(job, reason)])
 
     def _store(self, rows: list[Row]) -> None:
         self._good = True
@@ -147,14 +165,9 @@ class Driver:
             f"written; put it right, then {self.fix}"
         )
 
-    def _count_loss(self, answer: Died | Raised) -> None:
-        self._losses += 1
-        if not self._good and self._losses >= HOPELESS:
-            raise CampaignError(f"no trial ran, {self._losses} chunks were lost: {reason_of(answer)}")
-
 
 def reason_of(answer: Died | Raised) -> str:
-    """What a row says about a trial that left no outcome."""
+    """Text of the `failure` column of a trial without outcome."""
     return f"worker died ({answer.cause})" if isinstance(answer, Died) else f"error: {answer.text}"
 
 
@@ -165,18 +178,13 @@ def halves(job: ChunkJob) -> list[ChunkJob]:
 
 
 def chunk_size(trials: int, workers: int, largest: int) -> int:
-    """Even chunks, at most `largest` trials each and a multiple of the workers in number where that is possible."""
+    """Trials per chunk, at most `largest`. If possible, the number of chunks is a multiple of the workers."""
     rounds = math.ceil(trials / (largest * workers))
     return max(1, math.ceil(trials / (rounds * workers)))
 
 
 class InProcess(Generic[WorkT]):
-    """A pool of one: this process. A trial that kills it ends the campaign, which can be resumed.
-
-    Args:
-        evaluate: the work.
-        tell: told now and then how many rows' worth of the job is done.
-    """
+    """Runs jobs in this process. A trial that kills it ends the campaign, which can be resumed."""
 
     size = 1
 
@@ -196,4 +204,158 @@ class InProcess(Generic[WorkT]):
             return job, attempt(self._evaluate, job)
 
     def close(self) -> None:
-        """Nothing to end."""
+        """Do nothing."""
+
+
+Tell = Callable[[float], None]
+Note = Callable[[str], None]
+
+
+@dataclass(slots=True)
+class Keeper:
+    """Context manager that keeps one pool for several campaigns in turn.
+
+    Attributes:
+        watch: folder for the files of the running workers.
+        tell: progress callback of the present campaign.
+        note: message callback of the present campaign.
+    """
+
+    watch: Path
+    tell: Tell = field(default=lambda share: None)
+    note: Note = field(default=lambda text: None)
+    _pool: Pool[ChunkJob] | None = None
+
+    def lend(self, make: Callable[[Tell, Note], Pool[ChunkJob]], tell: Tell, note: Note) -> Lent:
+        """The pool, made at first use, reporting to this campaign's `tell` and `note`."""
+        self.tell, self.note = tell, note
+        if self._pool is None:
+            self._pool = make(lambda share: self.tell(share), lambda text: self.note(text))
+        return Lent(self._pool)
+
+    def __enter__(self) -> Keeper:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._pool is not None:
+            self._pool.close()
+            self._pool = None
+
+
+class Lent:
+    """A pool that stays open when its campaign closes it."""
+
+    def __init__(self, pool: Pool[ChunkJob]) -> None:
+        self._pool = pool
+
+    @property
+    def size(self) -> int:
+        """How many jobs may be in flight."""
+        return self._pool.size
+
+    @property
+    def ran_on(self) -> Mapping[str, str]:
+        """Environment of the job that ended last."""
+        return self._pool.ran_on
+
+    def submit(self, job: ChunkJob) -> None:
+        """Send a job."""
+        self._pool.submit(job)
+
+    def next(self) -> tuple[ChunkJob, Answer]:
+        """Wait for the next job to end."""
+        return self._pool.next()
+
+    def close(self) -> None:
+        """Do nothing. `Keeper` closes the pool."""
+
+
+Evaluate = Callable[[ChunkJob], list[Row]]
+FILES = frozenset(f"skillframe.fmu.{name}" for name in ("allow", "build", "extract", "foreign", "library"))
+"""Modules that turn an FMU file into something that runs; they do not depend on samples."""
+OLD_SIGNS = (
+    "no such file", "cannot be read", "MemoryError", "ImportError", "ModuleNotFoundError", "OSError", "PermissionError",
+    "FileNotFoundError", "unknown skill", "unknown world", "unknown coordinator", "is not installed",
+)  # fmt: skip
+"""Texts by which rows of version 0.1 indicate trouble of the environment."""
+
+
+class CampaignError(SkillframeError):
+    """A campaign cannot go on."""
+
+
+class Unusable(SkillframeError):
+    """Something that every trial needs cannot be loaded in this process."""
+
+
+class Raised(NamedTuple):
+    """The job raised.
+
+    Attributes:
+        text: the error in words, without "error: ".
+        trouble: whether it is trouble of the environment.
+        memory: whether memory ran out, so that fewer trials at once may work.
+    """
+
+    text: str
+    trouble: bool = False
+    memory: bool = False
+
+
+Answer = list[Row] | Died | Raised
+
+
+@contextmanager
+def needed(what: str) -> Iterator[None]:
+    """While open, any error but MemoryError is trouble of the environment.
+
+    Raises:
+        Unusable: in place of that error.
+    """
+    try:
+        yield
+    except MemoryError:
+        raise
+    except Exception as error:  # files and plug-ins may raise anything
+        raise Unusable(f"{what} cannot be loaded: {said(error)}") from error
+
+
+def attempt(evaluate: Callable[[WorkT], list[Row]], job: WorkT) -> list[Row] | Raised:
+    """Run a job and classify what it raises, also `sys.exit`. Ctrl-C passes through."""
+    try:
+        return evaluate(job)
+    except KeyboardInterrupt:
+        raise
+    except SystemExit as error:
+        return Raised(f"SystemExit: the skill or the world called sys.exit({error.code!r})")
+    except BaseException as error:  # a skill or world may raise anything
+        return Raised(said(error), is_trouble(error), isinstance(error, MemoryError))
+
+
+def said(error: BaseException) -> str:
+    """An error in words: the message of a skillframe error, otherwise with its type."""
+    if isinstance(error, ModuleNotFoundError) and (missing := missing_extra(error.name or "")):
+        error = missing
+    text = str(error)
+    return text if isinstance(error, SkillframeError) and text else f"{type(error).__name__}: {text}".removesuffix(": ")
+
+
+def is_trouble(error: BaseException) -> bool:
+    """Whether an error is trouble of the environment (see the module)."""
+    from skillframe.fmu.build import CompilerFailed
+
+    always = (MemoryError, OSError, ImportError, UnknownName, MissingDependency, BadPlugin, PluginConflict, Unusable)
+    if isinstance(error, (*always, ScoreFailed, CompilerFailed)):
+        return True
+    return isinstance(error, InputError) and not FILES.isdisjoint(_modules(error.__traceback__))
+
+
+def _modules(traceback: TracebackType | None) -> Iterator[str]:
+    while traceback is not None:
+        yield str(traceback.tb_frame.f_globals.get("__name__"))
+        traceback = traceback.tb_next
+
+
+def looks_like_trouble(failure: str) -> bool:
+    """Whether the failure of a row of version 0.1 may be trouble of the environment."""
+    return failure.startswith("error: ") and any(sign in failure for sign in OLD_SIGNS)

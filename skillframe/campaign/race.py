@@ -1,37 +1,40 @@
-"""A race of skills: one that is decidedly worse runs no more, and the race ends when one is left.
+"""A race of skills: skills that are significantly worse stop, and the race ends when one is left.
 
-Every `every` trials each two skills that still run are compared on the trials so far by the sequential McNemar test
-(`statistics.mcnemar_sequential`, valid at every look). Over the smallest p-value of each pair so far, Holm's method at
-`alpha`, over all pairs of skills, whether they still run or not. Of a pair that is decided, the skill with fewer
-successes, then and now, is left out. It keeps the trials up to that look, and its interval is the one that is valid at
-every look.
+After every `every` trials, each pair of running skills is compared by the sequential McNemar test
+(`statistics.mcnemar_sequential`, valid at every look), and Holm's method at `alpha` corrects the smallest p-value of
+each pair so far, over all pairs. Of a decided pair, the skill with fewer successes, both then and now, is left out; it
+keeps its trials up to that look.
 
-The looks follow the rows in the order of their trials, and a trial's draws are fixed by the seed beforehand, so who is
-left out when is a function of the rows alone: any workers and any resume end in the same table. Rows of a skill beyond
-the look at which it was left out, which happened to run, are dropped.
+Looks follow the order of the trials, whose samples the seed fixes, so the result depends on the rows alone. Rows of a
+skill beyond the look that left it out are dropped.
+
+Early stopping whose result does not depend on the order in which workers finish.
+
+The rule stops at the first trial t such that, over trials 0 ... t, every skill's confidence sequence
+(`statistics.confidence_sequence`) is narrow enough; refused starts do not count, and later trials are dropped. A race
+(`race`) ends by its own rule.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
 from typing import Any, NamedTuple
 
-from skillframe.campaign.claims.compare import more_trials
-from skillframe.campaign.rows import Row
-from skillframe.campaign.spec import RaceKeys
-from skillframe.campaign.statistics import correction, holm, mcnemar_sequential
+from skillframe.campaign.rows import Row, is_trial
+from skillframe.campaign.spec import CampaignSpec, RaceKeys
+from skillframe.campaign.statistics import confidence_sequence, correction, holm, mcnemar_sequential, more_trials
 
 
 class LeftOut(NamedTuple):
-    """Why a skill runs no more.
+    """Why a skill was left out.
 
     Attributes:
-        after: how many trials it ran.
+        after: trials that it ran.
         better: the skill that was better.
-        only_better: trials that only that one succeeded in.
-        only_it: trials that only the one that is left out succeeded in.
-        p_value: of "both are equally good", corrected for the number of pairs.
+        only_better, only_it: trials in which only that one or only this one succeeded.
+        p_value: of equally good skills, corrected for the number of pairs.
     """
 
     after: int
@@ -45,14 +48,9 @@ class Race:
     """Follows the rows of a campaign.
 
     Attributes:
-        left: the skills that were left out, in that order.
-        after: the last trial of the results, once one skill is left; None until then.
-        minima: the smallest p-value of each pair so far, not corrected.
-
-    Args:
-        labels: of the skills.
-        trials: the most that each runs.
-        keys: how to look.
+        left: the skills that were left out, in order.
+        after: the last trial of the results once one skill is left, otherwise None.
+        minima: the smallest uncorrected p-value of each pair so far.
     """
 
     def __init__(self, labels: Sequence[str], trials: int, keys: RaceKeys) -> None:
@@ -66,21 +64,37 @@ class Race:
         self.after: int | None = None
 
     def add(self, rows: Iterable[Row]) -> None:
-        """Take rows in any order."""
+        """Add rows in any order."""
         for row in rows:
             self._rows[row["skill"]][row["trial"]] = row["success"]
-        while self.after is None and self._looked < self._trials and self._there(self._next()):
-            self._look(self._next())
+        while self.after is None and self._looked < self._trials:
+            end = min(self._looked + self._keys.every, self._trials)
+            fresh = range(self._looked, end)
+            if not all(t in self._rows[label] for label in self._running() for t in fresh):
+                break
+            self._looked = end
+            open_pairs = list(combinations(self._running(), 2))
+            for first, second in open_pairs:
+                a, b = self._rows[first], self._rows[second]
+                won, lost = self._counts[first, second]
+                counts = won + sum(a[t] and not b[t] for t in fresh), lost + sum(b[t] and not a[t] for t in fresh)
+                self._counts[first, second] = counts
+                if (p_value := mcnemar_sequential(*counts)) < self.minima[first, second]:
+                    self.minima[first, second] = p_value
+                    self._ahead[first, second] = first if counts[0] > counts[1] else second
+            self._decide(dict(zip(self.minima, holm(list(self.minima.values())), strict=True)), open_pairs)
+            if len(self._running()) == 1:
+                self.after = end - 1
 
     @property
     def reach(self) -> dict[str, int]:
-        """How many trials each skill runs at most, as far as is known."""
+        """Trials that each skill runs at most, as far as known."""
         most = self._trials if self.after is None else self.after + 1
         return {label: self.left[label].after if label in self.left else most for label in self._labels}
 
     @property
     def kept(self) -> int:
-        """How many of the rows so far stay in the table."""
+        """Number of present rows that stay in the table."""
         reach, over = self.reach, self.after is not None
         return sum(reach[name] if over or name in self.left else len(rows) for name, rows in self._rows.items())
 
@@ -101,31 +115,8 @@ class Race:
     def _running(self) -> list[str]:
         return [label for label in self._labels if label not in self.left]
 
-    def _next(self) -> int:
-        return min(self._looked + self._keys.every, self._trials)
-
-    def _there(self, end: int) -> bool:
-        """Whether every skill that runs has all trials before `end`."""
-        return all(t in self._rows[label] for label in self._running() for t in range(self._looked, end))
-
-    def _look(self, end: int) -> None:
-        fresh = range(self._looked, end)
-        self._looked = end
-        open_pairs = list(combinations(self._running(), 2))
-        for first, second in open_pairs:
-            a, b = self._rows[first], self._rows[second]
-            won, lost = self._counts[first, second]
-            counts = won + sum(a[t] and not b[t] for t in fresh), lost + sum(b[t] and not a[t] for t in fresh)
-            self._counts[first, second] = counts
-            if (p_value := mcnemar_sequential(*counts)) < self.minima[first, second]:
-                self.minima[first, second] = p_value
-                self._ahead[first, second] = first if counts[0] > counts[1] else second
-        self._decide(dict(zip(self.minima, holm(list(self.minima.values())), strict=True)), open_pairs)
-        if len(self._running()) == 1:
-            self.after = end - 1
-
     def _decide(self, corrected: Mapping[tuple[str, str], float], pairs: Iterable[tuple[str, str]]) -> None:
-        """Leave out who is worse. Successes on the same trials put skills in an order, so one of them always stays."""
+        """Leave out the worse of each decided pair. Success counts order the skills, so one remains."""
         for pair in sorted(pairs, key=corrected.__getitem__):
             (first, second), (won, lost) = pair, self._counts[pair]
             better, worse = (first, second) if won > lost else (second, first)
@@ -134,7 +125,6 @@ class Race:
                 self.left.setdefault(worse, LeftOut(self._looked, better, *counts, corrected[pair]))
 
     def _more(self) -> int | None:
-        """About how many trials more would decide between those that run, if the rates stay as they are, or None."""
         running = self._running()
         if len(running) == 1 or not self._looked:
             return None
@@ -148,10 +138,63 @@ class Race:
 
 
 def told(label: str, found: Mapping[str, Any], trials: int, corrected: str) -> str:
-    """Why a skill was left out, as a sentence, from summary.json."""
+    """Sentence on why a skill was left out, from summary.json."""
     counts = f"only it succeeded in {found['only_better']} of them, only {label} in {found['only_it']}"
     how = f", {corrected}" if corrected.startswith("Holm") else ""
     return (
         f"{label} was left out after {found['after']} of {trials} trials, because {found['better']} is better: "
         f"{counts} (p = {found['p_value']:.2g}{how})"
     )
+
+
+class StopRule:
+    """Follows the rows of a campaign.
+
+    Attributes:
+        after: the last trial of the results, once decided.
+        race: the race, if the campaign is one.
+    """
+
+    def __init__(self, spec: CampaignSpec) -> None:
+        self.race = Race(spec.labels, spec.trials, spec.race) if spec.race else None
+        self._planned = spec.trials * len(spec.skills)
+        self._width, self._labels = spec.stop.interval_width, spec.labels
+        self._waiting: dict[int, dict[str, bool | None]] = {}
+        self._counts = {label: Counter[bool | None]() for label in self._labels}
+        self._next = 0
+        self.after: int | None = None
+
+    def add(self, rows: Iterable[Row]) -> None:
+        """Add rows in any order."""
+        if self.race is not None:
+            self.race.add(rows)
+            self.after = self.race.after
+        if self._width is None:
+            return
+        for row in rows:
+            self._waiting.setdefault(row["trial"], {})[row["skill"]] = row["success"] if is_trial(row) else None
+        while self.after is None and len(self._waiting.get(self._next, ())) == len(self._labels):
+            for label, success in self._waiting.pop(self._next).items():
+                self._counts[label][success] += 1
+            self._next += 1
+            ended = ((count[True], count[True] + count[False]) for count in self._counts.values())
+            if max(confidence_sequence(successes, trials).width for successes, trials in ended) <= self._width:
+                self.after = self._next - 1
+
+    @property
+    def left(self) -> dict[str, int]:
+        """Trials that each left-out skill ran."""
+        return {} if self.race is None else {label: found.after for label, found in self.race.left.items()}
+
+    @property
+    def planned(self) -> int:
+        """Number of rows of the final table, as far as known."""
+        return self._planned if self.race is None else sum(self.race.reach.values())
+
+    def total(self, done: int) -> int:
+        """Number of rows at the end: those planned, and those that a race has dropped."""
+        return self._planned if self.race is None else self.planned + done - self.race.kept
+
+    def wants(self, label: str, trial: int) -> bool:
+        """Whether a trial of a skill is still needed."""
+        return self.race is None or trial < self.race.reach[label]

@@ -1,10 +1,9 @@
-"""Runs a prepared campaign to its end, from wherever it stands: the first run and a resume are the same thing.
+"""Runs what is missing of a prepared campaign. The first run and a resume are the same.
 
-Rows are stored the moment a chunk ends; a kill loses the chunks in flight and nothing else. However it ends - done,
-early, interrupted, stopped by trouble of the environment (`trouble`) - results.csv and summary.json are written from
-the rows that are there. Last, the first trials, the typical success and the first failures of each skill run once more
-to leave their traces; because a trial's row does not depend on what runs beside it, that costs a few trials instead of
-traces of all.
+Rows are stored when a chunk ends, so a kill loses only the chunks in flight. However the run ends, results.csv and
+summary.json are written. Finally some trials of each skill run again to record traces.
+
+A replay runs one trial again, alone: the same row to the last bit, and its trace.
 """
 
 from __future__ import annotations
@@ -19,45 +18,54 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from skillframe.campaign.driver import CampaignError, Driver, Evaluate, InProcess, Pool, chunk_size
-from skillframe.campaign.folder import CAMPAIGN, COPIES, campaign_hash, load, sweep
-from skillframe.campaign.identity import identity, needed_plugins
-from skillframe.campaign.kept import Keeper, Note, Tell
-from skillframe.campaign.lock import FolderLock
-from skillframe.campaign.provenance import environment, file_hash, file_hashes
-from skillframe.campaign.remarks import remarks
+from skillframe.campaign.driver import (
+    CampaignError,
+    Driver,
+    Evaluate,
+    InProcess,
+    Keeper,
+    Note,
+    Pool,
+    Raised,
+    Tell,
+    attempt,
+    chunk_size,
+)
+from skillframe.campaign.folder import CAMPAIGN, COPIES, FolderLock, campaign_hash, load, sweep
+from skillframe.campaign.partial_results import LOST, ran_again, remarks, said_again
+from skillframe.campaign.provenance import (
+    environment,
+    environment_differences,
+    file_hash,
+    file_hashes,
+    identity,
+    needed_plugins,
+)
+from skillframe.campaign.race import StopRule
 from skillframe.campaign.rows import TRACE, ChunkJob, Row, dead_row, differences, trials_of
 from skillframe.campaign.spec import CampaignSpec
-from skillframe.campaign.stopping import StopRule
-from skillframe.campaign.store import RESULTS, RowLog, ordered, write_results
+from skillframe.campaign.statistics import nearest_to_median
+from skillframe.campaign.store import RESULTS, RowLog, ordered, read_content, write_results
 from skillframe.campaign.summary import summarize, write_summary
-from skillframe.campaign.typical import nearest_to_median
+from skillframe.errors import InputError, UnknownName
 from skillframe.files import write_whole
 from skillframe.robot.spec import load_robot
-from skillframe.robot.surroundings import collisions_note
+from skillframe.robot.tables import collisions_note
 
 CHUNK = 64
-"""Largest number of trials per job: batching has paid off by then, and a kill loses little."""
-TRACES = 8
-SAMPLE = 2
+"""Largest number of trials per job: larger batches are hardly faster, and a kill would lose more."""
 WATCH = "watch"
-"""Folder in a campaign's folder for the files of the workers that run now."""
-STILL_S = 120.0
-"""Wall time without progress after which a worker is taken for hung; our choice. Version 0.1 allowed a single trial 60
-s besides 0.25 s per simulated second, several times what any world was measured to take. Progress is told every ten
-milliseconds of simulated time, so what takes longest without it is to learn a skill on the spot: twice those 60 s."""
+"""Folder in a campaign's folder for the files of running workers."""
 
 
 class Progress(NamedTuple):
-    """How far a campaign is.
+    """Progress of a campaign.
 
     Attributes:
-        done: rows stored.
-        total: rows planned.
-        note: a sentence if there is something to say.
-        under_way: how many rows' worth of the chunks in flight is done; `done + under_way` never falls, so after a
-            chunk was lost it stands still until the same is done again.
-        usual: whether the note belongs to an undisturbed campaign, so that `--quiet` leaves it out.
+        done, total: rows stored and planned.
+        note: a sentence, or "".
+        under_way: rows' worth of the chunks in flight; `done + under_way` never falls.
+        usual: whether `--quiet` leaves the note out.
     """
 
     done: int
@@ -69,26 +77,26 @@ class Progress(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Options:
-    """How a campaign runs. Nothing here changes its rows.
+    """How a campaign runs, without effect on its rows.
 
     Attributes:
         workers: local processes; None runs in this one.
         scheduler: address of a Dask scheduler to use instead.
         chunk: largest number of trials per job.
-        time_limit_s: wall time that a job may take without simulated time going on; a slow one may take for ever.
-        memory_bytes: limit per local worker; None shares the machine's.
-        keeper: of workers that outlast the campaign; None starts its own and ends them.
-        traces: how many trials per skill leave a trace: the first `SAMPLE`, the success whose duration is nearest to
-            the median of all successes, then the first failures.
+        time_limit_s: wall time that a job may take without progress in simulated time.
+        memory_bytes: limit per local worker; None divides the machine's.
+        keeper: of workers that outlast the campaign, or None.
+        traces: trials per skill that leave a trace: the first two, the success nearest to the median duration,
+            then the first failures.
     """
 
     workers: int | None = None
     scheduler: str | None = None
     chunk: int = CHUNK
-    time_limit_s: float = STILL_S
+    time_limit_s: float = 120.0
     memory_bytes: int | None = None
     keeper: Keeper | None = None
-    traces: int = TRACES
+    traces: int = 8
 
 
 def run_campaign(
@@ -99,9 +107,9 @@ def run_campaign(
 
     Args:
         folder: made by `folder.prepare`.
-        evaluate: runs a chunk; a function that worker processes can import.
+        evaluate: runs a chunk; worker processes must be able to import it.
         options: how to run.
-        notify: told after every chunk, and now and then while chunks run.
+        notify: called after every chunk, and now and then in between.
         params: the world's parameter dataclass; None looks it up.
 
     Returns:
@@ -117,7 +125,7 @@ def run_campaign(
         with FolderLock(folder), RowLog(folder, campaign_hash(spec), spec) as log:
             sweep(folder)
             return _Session(spec, log, options or Options(), notify or (lambda progress: None)).run(evaluate)
-    except OSError as error:  # of our own files: a trial's was judged where it was raised
+    except OSError as error:  # of this session's files; errors within a trial were handled there
         raise CampaignError(
             f"{error.filename or folder}: {error.strerror or error}; finished rows are kept, put it right, then "
             f"{_resume(folder)}"
@@ -125,7 +133,7 @@ def run_campaign(
 
 
 class _Session:
-    """One process's work on a campaign."""
+    """The work of one process on a campaign."""
 
     def __init__(self, spec: CampaignSpec, log: RowLog, options: Options, notify: Callable[[Progress], None]) -> None:
         self.spec, self.log, self.options, self.notify = spec, log, options, notify
@@ -135,32 +143,67 @@ class _Session:
         self._plain, self._folder = spec.plain(), str(spec.folder.resolve())
 
     def run(self, evaluate: Evaluate) -> dict[str, Any]:
-        """Run, store, and write the tables whatever happens."""
+        """Run and store. Write the tables in any case."""
         start = time.perf_counter()
         self._tell()
-        for text in self._remarks() if self.log.unchecked else ():
-            self._tell(text)
+        if self.log.unchecked:
+            rows, log = list(self.log.done.values()), self.log
+            for text in remarks(
+                self.spec.folder, rows, unchecked=log.unchecked, environments=log.environments, summary=None
+            ):
+                self._tell(text)
         try:
             if not self._complete() or self._untraced():
                 with closing(self._pool(evaluate)) as pool:
                     self.log.note({"environment": environment(), "workers": pool.size, "started": time.time()})
                     self._driver(pool, lambda rows: self._keep(rows, pool.ran_on)).run(self._jobs(pool.size))
-                    self._again(pool)
+                    jobs = self._untraced()
+                    if jobs:
+                        self._tell(
+                            f"{sum(len(job.trials) for job in jobs)} of them run again, to leave traces", usual=True
+                        )
+                    self._driver(pool, self._keep_traces, traces=True).run(jobs)
         except BaseException:
-            with suppress(OSError):  # what stopped it is worth more words than what cannot be written now
+            with suppress(OSError):  # the first error matters more than one of writing
                 self._conclude(start)
             raise
-        return self._conclude(start)
-
-    def _remarks(self) -> list[str]:
-        rows, log = list(self.log.done.values()), self.log
-        return remarks(self.spec.folder, rows, unchecked=log.unchecked, environments=log.environments, summary=None)
+        summary = self._conclude(start)
+        if "ran_again" in summary:
+            self._tell(summary["ran_again"])
+        return summary
 
     def _conclude(self, start: float) -> dict[str, Any]:
-        """Note the time and write the tables, but never into a folder that has gone."""
+        """Store the wall time and write the tables, unless the folder has gone."""
         self._check_in_place()
         self.log.note({"wall_s": time.perf_counter() - start})
-        return self._write()
+        folder, rows = self.spec.folder, self._rows()
+        write_results(folder, self.spec, rows)
+        hashes = {
+            "campaign": campaign_hash(self.spec),
+            "files": file_hashes(folder, COPIES),
+            RESULTS: file_hash(folder / RESULTS),
+        }
+        summary = summarize(
+            self.spec,
+            rows,
+            self.log.sessions,
+            complete=self._complete(),
+            stop_after=self.rule.after,
+            hashes=hashes,
+            race=self.rule.race,
+        )
+        counts = Counter(self.log.done.ran_on((row["trial"], row["skill"])) for row in rows)
+        noted = enumerate(self.log.environments)
+        summary["environments"] = [
+            {"rows": counts[n], "versions": dict(environment)} for n, environment in noted if counts[n]
+        ]
+        robot = load_robot(str(folder / self.spec.robot))
+        if text := collisions_note(robot.name, robot.collisions):
+            summary["unwatched"] = text
+        if again := ran_again(self.log.sessions, self.log.done):
+            summary["ran_again"] = said_again(again)
+        write_summary(folder, summary)
+        return summary
 
     def _check_in_place(self) -> None:
         folder = self.spec.folder
@@ -169,13 +212,6 @@ class _Session:
                 f"{folder}: the campaign's folder was moved or deleted while it ran; finished rows are in it where it "
                 f"is now, go on there with skillframe campaign resume"
             )
-
-    def _again(self, pool: Pool[ChunkJob]) -> None:
-        """Run once more what is to leave a trace."""
-        jobs = self._untraced()
-        if jobs:
-            self._tell(f"{sum(len(job.trials) for job in jobs)} of them run again, to leave traces", usual=True)
-        self._driver(pool, self._keep_traces, traces=True).run(jobs)
 
     def _pool(self, evaluate: Evaluate) -> Pool[ChunkJob]:
         if self.options.workers is None and self.options.scheduler is None:
@@ -199,23 +235,30 @@ class _Session:
     def _driver(self, pool: Pool[ChunkJob], keep: Callable[[list[Row]], None], traces: bool = False) -> Driver:
         return Driver(
             pool=pool, keep=keep, lost=self._lost, enough=lambda: not traces and self.rule.after is not None,
-            wanted=lambda job: traces or self._wanted(job),
-            words=lambda job: trials_of(job, self.spec), tell=self._tell, fix=_resume(self.spec.folder),
+            wanted=lambda job: traces or any(self.rule.wants(self.spec.labels[job.skill], each) for each in job.trials),
+            words=lambda job: trials_of(job, self.spec), noted=self._forget if traces else self._note_lost,
+            tell=self._tell, fix=_resume(self.spec.folder),
         )  # fmt: skip
 
     @property
     def total(self) -> int:
-        """How many rows there will be, as far as is known: a race needs fewer than were planned."""
+        """Expected number of rows. A race needs fewer than planned."""
         return self.rule.total(len(self.log.done))
-
-    def _wanted(self, job: ChunkJob) -> bool:
-        return any(self.rule.wants(self.spec.labels[job.skill], trial) for trial in job.trials)
 
     def _lost(self, job: ChunkJob, reason: str) -> Row:
         return dead_row(self.spec, job.skill, job.trials[0], reason)
 
+    def _forget(self, job: ChunkJob, why: str) -> None:
+        """Do nothing: a job for traces decides no row."""
+
+    def _note_lost(self, job: ChunkJob, why: str) -> None:
+        """Store that trials ran without leaving rows, so that their next run is not taken for the first."""
+        lost = {"skill": self.spec.labels[job.skill], "trials": list(job.trials), "why": why}
+        with suppress(OSError):  # the job's error matters more than one of writing
+            self.log.note({LOST: lost})
+
     def _jobs(self, workers: int) -> Iterator[ChunkJob]:
-        """Chunks of what is missing, the skills side by side so that a prefix of the trials is complete early."""
+        """Chunks of missing trials, skills interleaved so that the first trials are complete early."""
         largest = self.options.chunk if self.spec.race is None else min(self.options.chunk, self.spec.race.every)
         size = chunk_size(self.spec.trials, workers, largest)
         for first in range(0, self.spec.trials, size):
@@ -239,7 +282,6 @@ class _Session:
         self.notify(Progress(done, self.total, note, self.furthest - done, usual))
 
     def _tell_share(self, under_way: float) -> None:
-        """Between chunks. The traces at the end are no rows."""
         if len(self.log.done) < self.total:
             self._tell(under_way=under_way)
 
@@ -247,7 +289,6 @@ class _Session:
         return self.rule.after is not None or len(self.log.done) == self.total
 
     def _untraced(self) -> list[ChunkJob]:
-        """A job per skill for the traces that are wanted and not there yet."""
         jobs: list[ChunkJob] = []
         if not self.options.traces:
             return jobs
@@ -257,7 +298,7 @@ class _Session:
                 ran_by[row["skill"]].append((row["trial"], row["duration_s"], row["success"]))
         for skill, label in enumerate(self.spec.labels):
             ran = ran_by[label]
-            picked = [trial for trial, _, _ in ran[: min(SAMPLE, self.options.traces)]]
+            picked = [trial for trial, _, _ in ran[: min(2, self.options.traces)]]
             typical = nearest_to_median({trial: seconds for trial, seconds, success in ran if success})
             if typical is not None and typical not in picked and len(picked) < self.options.traces:
                 picked.append(typical)
@@ -280,41 +321,79 @@ class _Session:
     def _rows(self) -> Sequence[Row]:
         return ordered(self.spec, self.log.done, self.rule.after, self.rule.left)
 
-    def _environments(self, rows: Sequence[Row]) -> list[dict[str, Any]]:
-        """Where rows ran, and how many. Those of skillframe 0.1 do not say."""
-        counts = Counter(self.log.done.ran_on((row["trial"], row["skill"])) for row in rows)
-        noted = enumerate(self.log.environments)
-        return [{"rows": counts[n], "versions": dict(environment)} for n, environment in noted if counts[n]]
-
-    def _write(self) -> dict[str, Any]:
-        folder, rows = self.spec.folder, self._rows()
-        write_results(folder, self.spec, rows)
-        hashes = {
-            "campaign": campaign_hash(self.spec),
-            "files": file_hashes(folder, COPIES),
-            RESULTS: file_hash(folder / RESULTS),
-        }
-        summary = summarize(
-            self.spec,
-            rows,
-            self.log.sessions,
-            complete=self._complete(),
-            stop_after=self.rule.after,
-            hashes=hashes,
-            race=self.rule.race,
-        )
-        summary["environments"] = self._environments(rows)
-        robot = load_robot(str(folder / self.spec.robot))
-        if text := collisions_note(robot.name, robot.collisions):
-            summary["unwatched"] = text
-        write_summary(folder, summary)
-        return summary
-
 
 def _resume(folder: Path) -> str:
     return f"type: skillframe campaign resume {folder}"
 
 
 def trace_path(folder: Path, trial: int, label: str) -> Path:
-    """Where the trace of a trial lies."""
+    """Path of a trial's trace."""
     return folder / "traces" / f"{trial:05d}_{re.sub(r'[^A-Za-z0-9.-]+', '_', label)}.npz"
+
+
+class Replayed(NamedTuple):
+    """A trial then and now.
+
+    Attributes:
+        then, now: the campaign's row, and that of the trial run alone.
+        changed: both values of each column that is not bit-identical.
+        environment: one line per entry that differs.
+        trace: content of the trace file.
+    """
+
+    then: Row
+    now: Row
+    changed: dict[str, tuple[Any, Any]]
+    environment: list[str]
+    trace: bytes | None
+
+
+def replay_trial(
+    folder: Path, trial: int, evaluate: Evaluate, skill: str | None = None, params: type | None = None
+) -> Replayed:
+    """Run a trial again.
+
+    Raises:
+        InputError: no such folder, rows of another campaign, or a trial without a row.
+        UnknownName: no such skill.
+        CampaignError: the trial cannot run here.
+    """
+    spec = load(folder, params)
+    label = pick_label(spec.labels, skill)
+    found = read_content(folder, campaign_hash(spec), spec)
+    done = found.done
+    if (trial, label) not in done:
+        numbers = sorted(t for t, name in done if name == label)
+        have = f"it has {len(numbers)} trials" + (f", {numbers[0]} to {numbers[-1]}" if numbers else "")
+        raise InputError(folder, f"trial {trial} of {label} has no row ({have})", "choose another trial, or resume")
+    job = ChunkJob(
+        spec=spec.plain(), folder=str(folder.resolve()), skill=spec.labels.index(label), trials=(trial,), traces=True
+    )
+    answer = attempt(evaluate, job)
+    if isinstance(answer, Raised) and answer.trouble:
+        raise CampaignError(f"trial {trial} of {label} cannot run here: {answer.text}")
+    now = dead_row(spec, job.skill, trial, f"error: {answer.text}") if isinstance(answer, Raised) else answer[0]
+    trace = now.pop(TRACE, None)
+    number = done.ran_on((trial, label))
+    if number is not None and number < len(found.environments):
+        ran_on: Mapping[str, str] = found.environments[number]
+    else:
+        noted = [session["environment"] for session in found.sessions if "environment" in session]
+        ran_on = noted[-1] if noted else {}
+    changes = environment_differences(ran_on, environment()) if ran_on else []
+    then = done[trial, label]
+    return Replayed(then, now, differences(then, now), changes, trace)
+
+
+def pick_label(labels: Sequence[str], skill: str | None) -> str:
+    """The label that equals a name or is the only one to begin with it.
+
+    Raises:
+        UnknownName: none or several.
+    """
+    if skill is None or skill in labels:
+        return skill or labels[0]
+    meant = [label for label in labels if label.startswith(skill)]
+    if len(meant) != 1:
+        raise UnknownName("skill", skill, labels)
+    return meant[0]

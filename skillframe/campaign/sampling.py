@@ -1,35 +1,157 @@
-"""Draws as a pure function of (campaign, trial): reproducible one by one, in any order, on any number of workers.
+"""How quantities vary over a campaign, and their samples as a pure function of (campaign, trial).
 
-Every independent quantity of every trial has a generator of its own,
+  "start.tilt_y"   = { uniform = [-0.21, 0.21] }      independent, low <= x < high
+  "start.offset_x" = { normal = [0.0, 0.002] }        independent, mean and standard deviation
+  "world.friction" = { choice = [0.1, 0.2, 0.3] }     independent, each equally likely
+  "start.tilt_x"   = { grid = [-0.1, 0.0, 0.1] }      every cell of the product of all grid axes
+  "start.tilt_x"   = { grid = { from = -0.1, to = 0.1, count = 5 } }
+  "start.offset_y" = { sobol = [-0.01, 0.01] }        all sobol axes together fill their box evenly
+  "start.offset_z" = { values = [0.01, 0.02] }        one value per trial, in this order
 
-    SeedSequence(seed, spawn_key=(trial, h(name))),   h = first 64 bits of SHA-256 of the quantity's name,
+Every independent quantity of every trial has its own generator,
 
-so that adding a quantity or a skill changes no other draw, and the order of calls does not matter. Grid axes are placed
-by the trial's number (see `spec`), sobol axes by the trial's point of one scrambled Sobol sequence over all of them
-(scipy's linear matrix scramble with a digital shift, seeded; no two points are independent): these two designs are
-joint, so adding an axis to a design changes that design and nothing else. Sobol points have periods of two, four ...
-Beside a grid or values axis, which may have the same, they are therefore shuffled over the campaign's trials: else a
-cell of a grid of four meets only one half of the box. Keying by name rather than by call order is our choice, because
-two skills that branch differently must still see the same trial (common random numbers halve the trials that a paired
-comparison needs).
+  SeedSequence(seed, spawn_key=(trial, h(name))),   h = first 64 bits of SHA-256 of the quantity's name,
+
+so another quantity or skill changes no other sample, and all skills see the same trials (common random numbers). Grid
+axes follow the trial's number (see `spec`); sobol axes take the trial's point of one scrambled Sobol sequence over all
+of them (scipy's linear matrix scramble with a digital shift). Sobol points have periods of 2, 4, ...; beside a grid or
+values axis they are shuffled over the trials, so that each cell of the grid meets the whole box.
 """
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
-from typing import Any
+import math
+import reprlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.campaign.axes import Value
-from skillframe.campaign.spec import CampaignSpec
+from skillframe.config import coerce
+from skillframe.errors import InputError, UnknownName
 from skillframe.frames import Float
 
+Value = float | int | bool | str
+KINDS = ("uniform", "normal", "choice", "grid", "sobol", "values")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Axis:
+    """One varied quantity.
+
+    Attributes:
+        kind: one of `KINDS`.
+        numbers: low, high; mean, standard deviation; or the values.
+    """
+
+    kind: str
+    numbers: tuple[Value, ...]
+
+    def draw(self, rng: np.random.Generator) -> Value:
+        """One sample of a "uniform", "normal" or "choice" axis."""
+        if self.kind == "choice":
+            return self.numbers[int(rng.integers(len(self.numbers)))]
+        a, b = float(self.numbers[0]), float(self.numbers[1])
+        if self.kind == "uniform":
+            return a + (b - a) * float(rng.random())
+        return a + b * float(rng.standard_normal())
+
+    def plain(self) -> dict[str, list[Value]]:
+        """The axis as it is written in TOML."""
+        return {self.kind: list(self.numbers)}
+
+
+def cells_of(vary: Mapping[str, Axis]) -> int:
+    """Number of cells of the product of all grid axes. 1 without any."""
+    return math.prod(len(axis.numbers) for axis in vary.values() if axis.kind == "grid")
+
+
+def parse_axis(value: Any, where: str) -> Axis:
+    """Read an axis from its TOML value.
+
+    Raises:
+        InputError: unknown kind, or numbers that do not fit it.
+    """
+    if not isinstance(value, Mapping) or len(value) != 1:
+        raise InputError(
+            where,
+            f"expected one distribution, got {reprlib.repr(value)}",
+            "write for example { uniform = [-0.1, 0.1] }",
+        )
+    ((kind, content),) = value.items()
+    if kind not in KINDS:
+        raise InputError(where, str(UnknownName("distribution", str(kind), KINDS)))
+    where = f"{where}.{kind}"
+    if kind in ("uniform", "sobol", "normal"):
+        names = "mean, standard deviation" if kind == "normal" else "low, high"
+        if not isinstance(content, list | tuple) or len(content) != 2:
+            raise InputError(where, f"expected [{names}], got {content!r}")
+        a, b = (_number(v, f"{where}[{i}]") for i, v in enumerate(content))
+        if kind == "normal" and b < 0.0:
+            raise InputError(where, f"standard deviation {b} is negative", "give zero or more")
+        if kind != "normal" and not a < b:
+            raise InputError(where, f"low {a} is not below high {b}", "write the smaller number first")
+        return Axis(kind=kind, numbers=(a, b))
+    if kind == "grid" and isinstance(content, Mapping):
+        for key in content:
+            if key not in ("from", "to", "count"):
+                raise InputError(where, str(UnknownName("key", str(key), ("from", "to", "count"))))
+        if len(content) != 3:
+            raise InputError(where, f"expected from, to and count, got {dict(content)!r}")
+        count: int = coerce(content["count"], int, f"{where}.count")
+        if count < 2:
+            raise InputError(f"{where}.count", f"is {count}", "give at least 2")
+        first, last = (_number(content[key], f"{where}.{key}") for key in ("from", "to"))
+        content = [float(v) for v in np.linspace(first, last, count)]
+    if not isinstance(content, list | tuple):
+        raise InputError(where, f"expected a list of values, got {content!r}")
+    if not content:
+        raise InputError(where, "is empty", "give at least one value")
+    values = tuple(_listed_value(v, f"{where}[{i}]") for i, v in enumerate(content))
+    if kind == "grid" and len(set(values)) != len(values):
+        raise InputError(where, f"holds a value twice: {content!r}", "give every value of a grid once")
+    return Axis(kind=kind, numbers=values)
+
+
+def _number(value: Any, where: str) -> float:
+    number: float = coerce(value, float, where)
+    if not math.isfinite(number):
+        raise InputError(where, f"is {number}", "give a finite number")
+    return number
+
+
+def _listed_value(value: Any, where: str) -> Value:
+    if isinstance(value, bool | str):
+        return value
+    if isinstance(value, int):
+        return value
+    return _number(value, where)
+
+
 Draws = dict[str, NDArray[Any]]
+
+
+class Design(Protocol):
+    """What samples depend on: a `skillframe.campaign.spec.CampaignSpec`."""
+
+    @property
+    def seed(self) -> int:
+        """Of every sample."""
+
+    @property
+    def trials(self) -> int:
+        """Number per skill."""
+
+    @property
+    def vary(self) -> Mapping[str, Axis]:
+        """Axes by quantity."""
+
+
 RUN = "run"
-"""Name under which a trial's own generator (sensor noise, random skills) is keyed."""
+"""Key of a trial's own generator (sensor noise, random skills)."""
 
 
 def seed_sequence(seed: int, trial: int, name: str) -> np.random.SeedSequence:
@@ -39,7 +161,7 @@ def seed_sequence(seed: int, trial: int, name: str) -> np.random.SeedSequence:
 
 
 def trial_rng(seed: int, trial: int) -> np.random.Generator:
-    """The generator that a trial's run gets. Each call makes a fresh one."""
+    """A fresh generator for a trial's run."""
     return np.random.default_rng(seed_sequence(seed, trial, RUN))
 
 
@@ -48,17 +170,19 @@ def trial_rngs(seed: int, trials: Sequence[int]) -> list[np.random.Generator]:
     return [trial_rng(seed, trial) for trial in trials]
 
 
-def draws(spec: CampaignSpec, trials: Sequence[int]) -> Draws:
-    """The varied quantities of some trials.
-
-    Args:
-        spec: the campaign.
-        trials: n trial numbers, in any order.
+def draws(spec: Design, trials: Sequence[int]) -> Draws:
+    """Sample the varied quantities of some trials.
 
     Returns:
-        quantity to (n,) array: float64, or the values' own type where a choice has other values than numbers.
+        (n,) array by quantity: float64, or the type of a choice's values.
     """
-    placed = {**_grid(spec, trials), **_sobol(spec, trials)}
+    result: Draws = {}
+    stride = 1
+    for name in sorted(n for n, axis in spec.vary.items() if axis.kind == "grid"):
+        numbers = spec.vary[name].numbers
+        result[name] = _column([numbers[trial // stride % len(numbers)] for trial in trials])
+        stride *= len(numbers)
+    placed = {**result, **_sobol(spec, trials)}
     return {name: placed[name] if name in placed else _independent(spec, name, trials) for name in spec.vary}
 
 
@@ -67,7 +191,7 @@ def _column(values: list[Value]) -> NDArray[Any]:
     return np.array(values) if alike else np.array(values, dtype=object)
 
 
-def _independent(spec: CampaignSpec, name: str, trials: Sequence[int]) -> NDArray[Any]:
+def _independent(spec: Design, name: str, trials: Sequence[int]) -> NDArray[Any]:
     axis = spec.vary[name]
     if axis.kind == "values":
         return _column([axis.numbers[trial] for trial in trials])
@@ -75,18 +199,7 @@ def _independent(spec: CampaignSpec, name: str, trials: Sequence[int]) -> NDArra
     return _column([axis.draw(rng) for rng in rngs])
 
 
-def _grid(spec: CampaignSpec, trials: Sequence[int]) -> Draws:
-    """Cell (trial mod cells), the axis that comes first by name running fastest."""
-    result: Draws = {}
-    stride = 1
-    for name in sorted(n for n, axis in spec.vary.items() if axis.kind == "grid"):
-        numbers = spec.vary[name].numbers
-        result[name] = _column([numbers[trial // stride % len(numbers)] for trial in trials])
-        stride *= len(numbers)
-    return result
-
-
-def _sobol(spec: CampaignSpec, trials: Sequence[int]) -> Draws:
+def _sobol(spec: Design, trials: Sequence[int]) -> Draws:
     names = sorted(n for n, axis in spec.vary.items() if axis.kind == "sobol")
     if not names or not len(trials):
         return {name: np.zeros(0) for name in names}
@@ -98,10 +211,10 @@ def _sobol(spec: CampaignSpec, trials: Sequence[int]) -> Draws:
     }
 
 
-def _sobol_places(spec: CampaignSpec, trials: Sequence[int]) -> NDArray[np.intp]:
-    """Which point each trial takes: its own number, but shuffled over the campaign beside axes that run in order."""
+def _sobol_places(spec: Design, trials: Sequence[int]) -> NDArray[np.intp]:
+    """Index of each trial's Sobol point: its number, or shuffled beside axes that run in order."""
     own = np.asarray(trials, dtype=np.intp)
-    if not spec.plan.in_order:
+    if cells_of(spec.vary) == 1 and all(axis.kind != "values" for axis in spec.vary.values()):
         return own
     order = np.random.default_rng(seed_sequence(spec.seed, 0, "sobol order")).permutation(spec.trials)
     places: NDArray[np.intp] = order[own]
@@ -109,7 +222,7 @@ def _sobol_places(spec: CampaignSpec, trials: Sequence[int]) -> NDArray[np.intp]
 
 
 def _sobol_points(seed: int, dimension: int, last: int) -> Float:
-    """At least points 0 .. last of the scrambled sequence, (m, dimension), generated in powers of two."""
+    """At least points 0 .. last of the scrambled sequence, (m, dimension). m is a power of two."""
     from scipy.stats import qmc
 
     scramble = np.random.default_rng(seed_sequence(seed, 0, "sobol"))

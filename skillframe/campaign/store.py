@@ -1,17 +1,15 @@
-"""The rows of a campaign, kept so that a kill at any moment loses at most the trials then running.
+"""The rows of a campaign, stored so that a kill loses at most the trials then running.
 
-`rows.jsonl` is written by one process, a line per row; the rows of a chunk go to the disk in one write and are synced
-(a power cut loses no more than that chunk). Its first line names the campaign by its hash, and every line ends with the
-CRC-32 of what stands before it, which catches damage and careless edits, not a forger. What many rows share stands in a
-line of its own before them (`packed`), so that a row takes less than 300 bytes. A torn last line is cut off when the
-file is opened. Files of older versions hold rows as JSON objects; they are read, and go on in their own version.
-`results.csv` is written from it, sorted by trial and skill, so it does not depend on the order in which chunks end;
-whole or not at all.
+One process writes `rows.jsonl`, a line per row; the rows of a chunk are written at once and synced. The first line
+holds the campaign's hash; each line ends with the CRC-32 of the text before it, which detects damage but no forgery.
+What rows share stands in a line before them (`packed`). Files of older versions keep their version, with rows as JSON
+objects. `results.csv` is written from it as a whole, sorted by trial and skill.
 """
 
 from __future__ import annotations
 
 import csv
+import io
 import json
 import os
 import re
@@ -20,10 +18,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
-from skillframe.campaign.packed import LAYOUT, Key, PackedRows, RowLayout, RowView, line_of, row_of
-from skillframe.campaign.rows import LEFT_OUT, Row, absent, cell, columns, decode, encode
+from skillframe.campaign.row_format import LAYOUT, Key, PackedRows, RowLayout, RowView, line_of, row_of
+from skillframe.campaign.rows import LEFT_OUT, Row, cell_of, columns, decode, encode
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.verify import FIX, KEYS, KINDS, Line, check_rows, check_shape
 from skillframe.errors import InputError
@@ -33,26 +31,24 @@ from skillframe.files.documents import parse_json
 ROWS, RESULTS = "rows.jsonl", "results.csv"
 FORMAT, VERSION = "skillframe.campaign", 1
 ROWS_VERSION = 3
-"""1 had no checksums, which is said of its files; 2 had a JSON object with all columns per row."""
-SIGNED, PACKED = 2, 3
-"""First versions with checksums and with layouts."""
+"""Version 1 had no checksums; 2 had a JSON object with all columns per row."""
+PACKED = 3
 BINARY = getattr(os, "O_BINARY", 0)  # Windows would turn line ends into two bytes otherwise
 BLOCK = 4096
-"""Rows that are held against the campaign's draws at a time: each time, a Sobol sequence is made anew."""
+"""Rows checked against the campaign's samples at a time; each check makes the Sobol sequence anew."""
 RAN_ON = "ran_on"
-"""Key of a line that says in which of the noted environments its row ran."""
 Done = Mapping[Key, Row]
 Environment = Mapping[str, str]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Content:
-    """What `rows.jsonl` holds.
+    """Content of `rows.jsonl`.
 
     Attributes:
         done: the stored rows by (trial, skill).
-        sessions: what was noted about each process that wrote here.
-        unchecked: how many lines carry no checksum, as in files of skillframe 0.1.
+        sessions: notes of each process that wrote here.
+        unchecked: number of lines without a checksum.
         version: of the file.
         layouts: one more than the largest number of a layout.
     """
@@ -65,20 +61,18 @@ class Content:
 
     @property
     def environments(self) -> list[Environment]:
-        """Where rows ran, by the number that their lines give."""
+        """Where rows ran, by number."""
         return [session[RAN_ON] for session in self.sessions if RAN_ON in session]
 
 
 class RowLog:
-    """The open `rows.jsonl` of a campaign. Use it as a context manager, under the folder's lock.
+    """Context manager of a campaign's open `rows.jsonl`. Requires the folder's lock.
 
     Attributes:
-        done: the stored rows by (trial, skill).
-        sessions: what was noted about each process that wrote here.
-        unchecked: lines without a checksum that were read.
+        done, sessions, unchecked: as in `Content`.
 
     Raises:
-        InputError: on construction, if the file is of another campaign, or its rows are not what `spec` draws.
+        InputError: on construction, if the file is of another campaign, or its rows are not the samples of `spec`.
     """
 
     def __init__(self, folder: Path, campaign: str, spec: CampaignSpec | None = None) -> None:
@@ -93,17 +87,16 @@ class RowLog:
             self._write([{"format": FORMAT, "version": ROWS_VERSION, "campaign": campaign}])
 
     def append(self, rows: Iterable[Row], environment: Environment | None = None) -> list[Row]:
-        """Store rows, and where they ran. Returns those that are new (a stored trial keeps its first row)."""
+        """Store rows and their environment. Returns the new ones. A stored trial keeps its first row."""
         fresh = [row for row in rows if (row["trial"], row["skill"]) not in self.done]
         ran_on = None if environment is None or not fresh else self._number(environment)
         self._write(self._records(fresh, ran_on))
-        for row in fresh:  # before the sync, where Ctrl-C may come
+        for row in fresh:  # before the sync, which Ctrl-C may interrupt
             self.done.add(row, ran_on)
         self._sync()
         return fresh
 
     def _records(self, rows: Sequence[Row], ran_on: int | None) -> Iterator[Mapping[str, Any]]:
-        """Rows as lines of the file's version, each layout stated before its first row."""
         for row in rows:
             if self._version < PACKED:
                 where = {} if ran_on is None else {RAN_ON: ran_on}
@@ -117,7 +110,7 @@ class RowLog:
             yield line_of(self._stated[layout], layout, row)
 
     def _number(self, environment: Environment) -> int:
-        """The number under which an environment is noted. A new one is noted now."""
+        """Number of an environment, which is stored if new."""
         if environment not in self.environments:
             self.note({RAN_ON: dict(environment)})
             self.environments.append(environment)
@@ -130,7 +123,7 @@ class RowLog:
         self._sync()
 
     def _write(self, records: Iterable[Mapping[str, Any]]) -> None:
-        """Append lines. Where that fails, the file is as it was.
+        """Append lines. On failure the file is restored.
 
         Raises:
             OSError: `filename` is the file.
@@ -154,7 +147,7 @@ class RowLog:
             raise type(error)(error.errno, error.strerror, str(self._path)) from None
 
     def in_place(self) -> bool:
-        """Whether the file that is written is still the one under its name: the folder was not moved or deleted."""
+        """Whether the file is still under its name, and not moved or deleted with its folder."""
         with suppress(OSError):
             return os.path.samestat(os.fstat(self._descriptor), self._path.stat())
         return False
@@ -171,7 +164,7 @@ class RowLog:
 
 
 def repair_tail(path: Path) -> None:
-    """Cut a file off after its last newline: what follows is the torn line of a process that was killed."""
+    """Remove a torn last line, which a killed process left."""
     with suppress(FileNotFoundError), path.open("r+b") as file:
         content = file.read()
         whole = content.rfind(b"\n") + 1
@@ -180,15 +173,15 @@ def repair_tail(path: Path) -> None:
 
 
 def read_content(folder: Path, campaign: str | None = None, spec: CampaignSpec | None = None) -> Content:
-    """What `rows.jsonl` holds. A torn last line is left out.
+    """Read `rows.jsonl`, without a torn last line.
 
     Args:
         folder: the campaign's folder.
-        campaign: the hash that the file must carry; None to take any.
-        spec: the campaign that the rows are held against; None trusts them.
+        campaign: the required hash; None accepts any.
+        spec: the campaign to check the rows against, or None.
 
     Raises:
-        InputError: not a campaign's rows, of another campaign, or damaged or changed before the last line.
+        InputError: no campaign's rows, of another campaign, or damaged or changed before the last line.
     """
     path = folder / ROWS
     try:
@@ -199,7 +192,7 @@ def read_content(folder: Path, campaign: str | None = None, spec: CampaignSpec |
 
 
 class _Reader:
-    """Reads the lines of a file one by one, so that no more than some of them are held at a time."""
+    """Reads the lines of a file in blocks."""
 
     def __init__(self, path: Path, campaign: str | None, spec: CampaignSpec | None) -> None:
         self._path, self._campaign, self._spec = path, campaign, spec
@@ -210,19 +203,29 @@ class _Reader:
         self._block: list[Line] = []
 
     def read(self, texts: Iterable[bytes]) -> Content:
-        """All there is."""
+        """Read all lines."""
         version, unchecked = ROWS_VERSION, 0
         for number, text in enumerate(texts, start=1):
-            intact = _is_intact(text)
+            found = re.search(rb', "crc32": "([0-9a-f]{8})"\}$', text)
+            intact = None if found is None else zlib.crc32(text[: found.start()]) == int(found[1], 16)
             record = _record(self._path, number, text, intact)
             if number == 1:
                 version = _check_header(self._path, record, self._campaign)
             if intact is None:
-                if version >= SIGNED:
+                if version >= 2:
                     raise InputError(f"{self._path}: line {number}", "has lost its checksum", FIX)
                 unchecked += 1
             if number > 1:
-                self._take(number, record)
+                if "session" in record:
+                    self._sessions.append(_session(self._path, number, record))
+                elif LAYOUT not in record:
+                    self._add(number, *_plain(self._path, number, record))
+                elif "columns" in record:
+                    self._state(number, record)
+                elif type(record[LAYOUT]) is int and record[LAYOUT] in self._layouts:
+                    self._add(number, *self._unpacked(number, record))
+                else:  # the order of lines may have changed
+                    self._early.append((number, record))
         for number, record in self._early:
             self._add(number, *self._unpacked(number, record))
         self._check_block()
@@ -230,18 +233,6 @@ class _Reader:
             done=self._done, sessions=tuple(self._sessions), unchecked=unchecked, version=version,
             layouts=1 + max(self._layouts, default=-1),
         )  # fmt: skip
-
-    def _take(self, number: int, record: Row) -> None:
-        if "session" in record:
-            self._sessions.append(_session(self._path, number, record))
-        elif LAYOUT not in record:
-            self._add(number, *_plain(self._path, number, record))
-        elif "columns" in record:
-            self._state(number, record)
-        elif type(record[LAYOUT]) is int and record[LAYOUT] in self._layouts:
-            self._add(number, *self._unpacked(number, record))
-        else:  # lines may have been put into another order
-            self._early.append((number, record))
 
     def _state(self, number: int, record: Row) -> None:
         where, layout = f"{self._path}: line {number}", record[LAYOUT]
@@ -261,7 +252,6 @@ class _Reader:
             raise InputError(where, str(error), FIX) from None
 
     def _add(self, number: int, row: Row, ran_on: int | None) -> None:
-        """Take a row, after it was held against the campaign."""
         where = f"{self._path}: line {number}"
         check_shape(where, row, KINDS if self._spec is not None else KEYS)
         if (row["trial"], row["skill"]) in self._done:
@@ -281,15 +271,8 @@ class _Reader:
 
 
 def _line(record: Mapping[str, Any]) -> bytes:
-    """A record as a line that ends with the checksum of what stands before it."""
     text = json.dumps(record, allow_nan=False, ensure_ascii=False, separators=(",", ":")).encode()[:-1]
     return b'%s, "crc32": "%08x"}\n' % (text, zlib.crc32(text))
-
-
-def _is_intact(line: bytes) -> bool | None:
-    """Whether a line is as it was written. None if it carries no checksum."""
-    found = re.search(rb', "crc32": "([0-9a-f]{8})"\}$', line)
-    return None if found is None else zlib.crc32(line[: found.start()]) == int(found[1], 16)
 
 
 def _record(path: Path, number: int, line: bytes, intact: bool | None) -> Row:
@@ -307,7 +290,7 @@ def _record(path: Path, number: int, line: bytes, intact: bool | None) -> Row:
 
 
 def _plain(path: Path, number: int, record: Row) -> tuple[Row, int | None]:
-    """A row as versions before `PACKED` stored it, and where it ran."""
+    """A row stored before version `PACKED`, and the number of its environment."""
     ran_on = record.pop(RAN_ON, None)
     try:
         return decode(record), ran_on if isinstance(ran_on, int) else None
@@ -326,7 +309,6 @@ def _session(path: Path, number: int, record: Row) -> dict[str, Any]:
 
 
 def _check_header(path: Path, header: Row, campaign: str | None) -> int:
-    """The file's version."""
     version = header.get("version", 0)
     if header.get("format") != FORMAT or not isinstance(version, int):
         raise InputError(f"{path}: line 1", "is not the head of a campaign's rows", "start again in a new folder")
@@ -343,14 +325,7 @@ def _check_header(path: Path, header: Row, campaign: str | None) -> int:
 def ordered(
     spec: CampaignSpec, done: Done, stop_after: int | None = None, left: Mapping[str, int] | None = None
 ) -> Sequence[Row]:
-    """Rows by trial, then by skill, without those after the trial at which the campaign stopped.
-
-    Args:
-        spec: the campaign.
-        done: all there are.
-        stop_after: the last trial of a campaign that stopped early.
-        left: trials of the skills that a race left out. Their rows beyond are dropped, and the others say so.
-    """
+    """Rows by trial, then by skill, up to the trial at which the campaign stopped."""
     order, gone = {label: i for i, label in enumerate(spec.labels)}, left or {}
     kept = (key for key in done if stop_after is None or key[0] <= stop_after)
     raced = (key for key in kept if key[0] < gone.get(key[1], spec.trials))
@@ -363,11 +338,22 @@ def ordered(
 
 def write_results(folder: Path, spec: CampaignSpec, rows: Sequence[Row]) -> None:
     """Write results.csv from ordered rows."""
-    names = columns(spec, rows)
     with (
         writing_whole(folder / RESULTS) as temporary,
         temporary.open("w", encoding="utf-8", newline="") as file,
     ):
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(names)
-        writer.writerows([cell(row.get(name, absent(name))) for name in names] for row in rows)
+        _write_table(file, spec, rows)
+
+
+def results_text(spec: CampaignSpec, rows: Sequence[Row]) -> str:
+    """The content of results.csv."""
+    text = io.StringIO(newline="")
+    _write_table(text, spec, rows)
+    return text.getvalue()
+
+
+def _write_table(file: TextIO, spec: CampaignSpec, rows: Sequence[Row]) -> None:
+    names = columns(spec, rows)
+    writer = csv.writer(file, lineterminator="\n")
+    writer.writerow(names)
+    writer.writerows([cell_of(row, name) for name in names] for row in rows)

@@ -1,4 +1,4 @@
-"""summary.json: rates with intervals that hold, comparisons in pairs, and what the figures depend on."""
+"""summary.json: rates with intervals, paired comparisons, and what the figures depend on."""
 
 from __future__ import annotations
 
@@ -11,57 +11,59 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from skillframe.campaign.packed import RowView
+from skillframe.campaign.folder import SUMMARY
 from skillframe.campaign.race import Race
-from skillframe.campaign.rows import LEFT_OUT, SCORE, Row
+from skillframe.campaign.row_format import RowView
+from skillframe.campaign.rows import LEFT_OUT, SCORE, Row, is_trial
 from skillframe.campaign.spec import CampaignSpec
-from skillframe.campaign.statistics import correction, holm
+from skillframe.campaign.statistics import Basis, Validity, correction, holm, judged, unbroken, validity_of
 from skillframe.campaign.store import FORMAT, VERSION
-from skillframe.campaign.validity import Basis, Validity, unbroken, validity_of
-from skillframe.campaign.verdict import judged
 from skillframe.errors import InputError
-from skillframe.execution.scores import about
-from skillframe.execution.tracemeta import SHARES
+from skillframe.execution.trace import SHARES, about
 from skillframe.files import write_whole
 from skillframe.files.documents import read_json
-from skillframe.robot.guesses import guess_note
+from skillframe.robot.link_checks import guess_note
 from skillframe.robot.spec import load_robot
 
-SUMMARY = "summary.json"
 PEAKS = ("peak_force_n", "peak_force_10ms_n", "peak_force_filtered_n", *SHARES)
 
 
 def rates(spec: CampaignSpec, rows: Sequence[Row], complete: bool) -> dict[str, dict[str, Any]]:
-    """Per skill: trials, successes, rate, `interval_95` (null if there is none), method, and how often which failure.
+    """Per skill: trials, successes, rate, `interval_95` (or null), method, and the count of each failure.
 
-    Besides, how often which code of `ended_by`, and the largest forces and shares of the motors. Which interval it is,
-    and why there may be none, `validity` says. An unfinished campaign counts each skill's trials up to the first one
-    that is missing; `uncounted` is the number of its rows beyond. `unended` counts successes whose skill had not
-    ended by itself when the time was up. A skill that a race left out says after how many trials, `left_out_after`.
+    Also the count of each `ended_by`, and the largest forces and shares of the motors. An unfinished campaign counts
+    each skill's trials up to the first missing one; `uncounted` is the number of rows beyond. `unended` counts
+    successes whose skill had not ended by itself, `refused` the starts in penetration, which are in no other figure.
+    `left_out_after` is the number of trials of a skill that a race left out.
     """
     validity = validity_of(spec.plan, complete=complete)
     return {label: _rate(_of(rows, label, complete), rows, label, validity) for label in spec.labels}
 
 
 def _of(rows: Sequence[Row], label: str, complete: bool) -> Sequence[Row]:
-    """The rows of a skill that count."""
     mine = {place: row["trial"] for place, row in enumerate(rows) if row["skill"] == label}
     reach = unbroken(mine.values())
     return RowView(rows.__getitem__, [place for place, trial in mine.items() if complete or trial < reach])
 
 
 def _rate(counted: Sequence[Row], rows: Sequence[Row], label: str, validity: Validity) -> dict[str, Any]:
-    n, s, unended = len(counted), 0, 0
+    n, s, unended, inside = 0, 0, 0, list[str]()
     failures, ended, largest = Counter[str](), Counter[str](), dict[str, float | None].fromkeys(PEAKS)
-    for row in counted:  # once, for each is made anew
+    for row in counted:  # one pass, as each row is unpacked anew
+        if not is_trial(row):
+            inside.append(f"trial {row['trial']} {row['failure']}")
+            continue
+        n += 1
         s += row["success"]
         unended += row["success"] and row.get("ended_itself") is False
         if not row["success"]:
             failures[row["failure"]] += 1
-        if "ended_by" in row:  # rows of 0.1 do not say
+        if "ended_by" in row:  # absent in version 0.1
             ended[row["ended_by"]] += 1
         for name in PEAKS:
-            largest[name] = _larger(largest[name], row.get(name))
+            found, value = largest[name], row.get(name)
+            if isinstance(value, float) and math.isfinite(value) and (found is None or value > found):
+                largest[name] = value
     interval = validity.interval(s, n)
     return {
         "skill": label,
@@ -74,22 +76,17 @@ def _rate(counted: Sequence[Row], rows: Sequence[Row], label: str, validity: Val
         "failures": dict(sorted(failures.items())),
         "ended_by": dict(sorted(ended.items())),
         "largest": largest,
-        "uncounted": sum(row["skill"] == label for row in rows) - n,
+        "uncounted": sum(row["skill"] == label for row in rows) - len(counted),
+        "refused": len(inside),
+        **({"refused_first": inside[0]} if inside else {}),
         **({LEFT_OUT: counted[0][LEFT_OUT]} if counted and LEFT_OUT in counted[0] else {}),
     }
 
 
-def _larger(found: float | None, value: Any) -> float | None:
-    """The larger of what was found and a finite number."""
-    if not isinstance(value, float) or not math.isfinite(value):
-        return found
-    return value if found is None or value > found else found
-
-
 def scores(spec: CampaignSpec, rows: Sequence[Row], complete: bool) -> dict[str, dict[str, Any]]:
-    """Per score its unit, its summary, and by skill how many trials have it, its median, smallest and largest value.
+    """Per score its unit and summary, and per skill the number of trials, median, smallest and largest value (or null).
 
-    The trials are those that count for the rates. A skill without any such trial has nulls.
+    The trials are those that count for the rates.
     """
     return {
         name: about(name) | {"skills": {label: _spread(_of(rows, label, complete), name) for label in spec.labels}}
@@ -98,7 +95,7 @@ def scores(spec: CampaignSpec, rows: Sequence[Row], complete: bool) -> dict[str,
 
 
 def _spread(rows: Sequence[Row], name: str) -> dict[str, float | int | None]:
-    values = [row[SCORE + name] for row in rows if not math.isnan(row[SCORE + name])]
+    values = [row[SCORE + name] for row in rows if is_trial(row) and not math.isnan(row[SCORE + name])]
     if not values:
         return {"trials": 0, "median": None, "smallest": None, "largest": None}
     return {"trials": len(values), "median": median(values), "smallest": min(values), "largest": max(values)}
@@ -109,10 +106,11 @@ def comparisons(
 ) -> list[dict[str, Any]]:
     """Every pair of skills on the trials that both ran. `p_value` is corrected for the number of pairs.
 
-    The p-values of a race are the smallest ones at its looks.
+    For a race, the p-values are the smallest at its looks.
     """
     validity = validity_of(spec.plan, complete=complete)
-    outcome = {label: {r["trial"]: r["success"] for r in _of(rows, label, complete)} for label in spec.labels}
+    ended = {label: filter(is_trial, _of(rows, label, complete)) for label in spec.labels}
+    outcome = {label: {row["trial"]: row["success"] for row in ended[label]} for label in spec.labels}
     pairs = [_comparison(a, b, outcome, validity) for a, b in combinations(spec.labels, 2)]
     if race is not None:
         for pair in pairs:
@@ -145,21 +143,17 @@ def summarize(
     spec: CampaignSpec, rows: Sequence[Row], sessions: Sequence[Mapping[str, Any]], *, complete: bool,
     stop_after: int | None, hashes: Mapping[str, Any], race: Race | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """The whole of summary.json.
-
-    Args:
-        spec: the campaign.
-        rows: its rows, ordered.
-        sessions: the notes of `RowLog`; the last one's workers and versions are the summary's.
-        complete: all trials ran, or the campaign stopped early as asked.
-        stop_after: last trial of a campaign that stopped early.
-        hashes: of the campaign and of its files.
-        race: of a campaign that is one.
-    """
+    """The content of summary.json."""
     opened = [session for session in sessions if "environment" in session]
     last = opened[-1] if opened else {}
     figures = rates(spec, rows, complete)
-    guess = _guessed(spec, rows)
+    failed = any(not row["success"] for row in rows if is_trial(row))
+    guess = guess_note(load_robot(str(spec.folder / spec.robot))) if failed else ""
+    verdict: dict[str, Any] = {}
+    if spec.expect.rate is not None:
+        label = spec.expect.skill or spec.labels[0]
+        word, why = judged(spec.expect.rate, figures[label], complete=complete)
+        verdict = {"verdict": {"skill": label, "required_rate": spec.expect.rate, "verdict": word, "why": why}}
     return {
         "format": FORMAT,
         "version": VERSION,
@@ -171,7 +165,7 @@ def summarize(
         "complete": complete,
         "stopped_after_trial": stop_after,
         "skills": figures,
-        **_verdict(spec, figures, complete),
+        **verdict,
         "comparisons": comparisons(spec, rows, complete, race),
         **({"race": race.outcome()} if race else {}),
         **({"scores": scores(spec, rows, complete)} if spec.scores else {}),
@@ -184,29 +178,26 @@ def summarize(
     }
 
 
-def _verdict(spec: CampaignSpec, figures: Mapping[str, Mapping[str, Any]], complete: bool) -> dict[str, Any]:
-    """`verdict`, where the campaign requires something: of which skill, what, and what came of it."""
-    if spec.expect.rate is None:
-        return {}
-    label = spec.expect.skill or spec.labels[0]
-    word, why = judged(spec.expect.rate, figures[label], complete=complete)
-    return {"verdict": {"skill": label, "required_rate": spec.expect.rate, "verdict": word, "why": why}}
-
-
-def _guessed(spec: CampaignSpec, rows: Sequence[Row]) -> str:
-    """What to say of the robot's guessed masses where a trial failed, else ""."""
-    failed = any(not row["success"] for row in rows)
-    return guess_note(load_robot(str(spec.folder / spec.robot))) if failed else ""
+def refused_text(figures: Mapping[str, Any]) -> str:
+    """Sentence on refused starts, or "". `figures` as from `rates`."""
+    count = figures.get("refused", 0)
+    if not count:
+        return ""
+    share = f"{count} of {count + figures['trials']} starts ({count / (count + figures['trials']):.1%})"
+    return (
+        f"{share} are refused and count neither as successes nor as failures: the rate is of the other starts of the "
+        f"declared ranges alone. The first: {figures['refused_first']}. Narrow the ranges"
+    )
 
 
 def write_summary(folder: Path, summary: Mapping[str, Any]) -> None:
-    """Write summary.json, whole or not at all."""
+    """Write summary.json as a whole."""
     text = json.dumps(summary, indent=2, sort_keys=True, ensure_ascii=False) + "\n"
     write_whole(folder / SUMMARY, text.encode())
 
 
 def read_summary(folder: Path) -> dict[str, Any]:
-    """The summary of a campaign's folder.
+    """Read summary.json of a campaign's folder.
 
     Raises:
         InputError: there is none, or it is damaged.
@@ -220,7 +211,7 @@ def read_summary(folder: Path) -> dict[str, Any]:
 
 
 def below_bar(spec: CampaignSpec, summary: Mapping[str, Any]) -> str:
-    """A sentence if a complete campaign does not reach its threshold, else "". `Expect.by` says what has to."""
+    """A sentence if a complete campaign misses its threshold by `Expect.by`, otherwise ""."""
     label, required = spec.expect.skill or spec.labels[0], spec.expect.rate
     if required is None or not summary["complete"]:
         return ""
@@ -229,4 +220,6 @@ def below_bar(spec: CampaignSpec, summary: Mapping[str, Any]) -> str:
         word, why = judged(required, figures, complete=True)
         return "" if word == "pass" else f"{label}: {word}: {why}"
     rate = figures["rate"]
+    if rate is None:
+        return f"{label}: no trial, for all {figures['refused']} starts are inside something"
     return "" if rate >= required else f"{label}: success rate {rate:.3f} is below the threshold of {required:g}"

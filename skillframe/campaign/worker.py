@@ -1,11 +1,8 @@
-"""What runs inside a worker process: a job under a watchdog, a file that says how far it is, no ear for Ctrl-C.
+"""Runs a job inside a worker process: with a watchdog, a progress file, and Ctrl-C ignored.
 
-A slow job is not a hung one: the watchdog is wound again whenever the job says that it has come further, so it ends
-what makes no progress, however long the whole takes. It is `faulthandler`'s C thread, which a job that holds the
-interpreter's lock cannot stop.
-
-A terminal sends Ctrl-C to all processes at once; it is the client that answers it, by ending the workers. Dask imports
-this module in every worker it starts (`preload`) and calls `dask_setup`.
+Progress restarts the watchdog, so it ends only jobs that hang. It is `faulthandler`'s C thread, which works also while
+a job holds the interpreter's lock. A terminal sends Ctrl-C to all processes; the client answers it by ending the
+workers. Dask imports this module in every worker (`preload`) and calls `dask_setup`.
 """
 
 from __future__ import annotations
@@ -19,27 +16,24 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TextIO
 
-from skillframe.campaign.chunk_progress import Listener, listening
+from skillframe.campaign.driver import Raised, attempt
+from skillframe.campaign.jobs import Listener, WorkT, listening
 from skillframe.campaign.rows import Row
-from skillframe.campaign.trouble import Raised, attempt
-from skillframe.campaign.work import WorkT
-
-PULSE_S = 0.5
 
 
 def dask_setup(worker: object) -> None:
-    """Called by Dask in the main thread of a worker process as it starts."""
+    """Called by Dask in the main thread of a starting worker process."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def guarded(evaluate: Callable[[WorkT], list[Row]], job: WorkT, seconds: float, watch: str) -> list[Row] | Raised:
-    """Run a job. Once it makes no progress any more, the process is ended and what it was doing is written to a file.
+    """Run a job. After `seconds` (wall time, may be infinite) without progress, the process ends itself.
 
     Args:
         evaluate: the work.
         job: its argument.
-        seconds: wall time without progress after which the worker ends itself; infinite: never.
-        watch: path of the file, removed if the job ends in time.
+        seconds: see above.
+        watch: file for the stack of a hanging job, removed if it ends in time.
     """
     path, share = Path(watch), share_file(Path(watch))
     try:
@@ -59,19 +53,17 @@ def guarded(evaluate: Callable[[WorkT], list[Row]], job: WorkT, seconds: float, 
 
 
 def _wind(seconds: float, file: TextIO) -> None:
-    """Begin the watchdog's time again."""
     if math.isfinite(seconds):
         faulthandler.dump_traceback_later(seconds, exit=True, file=file)
 
 
 def share_file(watch: Path) -> Path:
-    """Where a job says how far it is, beside its watchdog's file."""
+    """Path of a job's progress file, beside its watchdog's file."""
     return watch.with_suffix(".share")
 
 
 def _writing_to(path: Path, seconds: float, file: TextIO) -> Listener:
-    """Winds the watchdog and writes how far the job is, now and then. A failed write does not stop it."""
-    every = min(PULSE_S, seconds / 4.0)
+    every = min(0.5, seconds / 4.0)
     due, furthest = time.monotonic() + every, 0.0
 
     def report_progress(share: float) -> None:

@@ -1,4 +1,4 @@
-"""`skillframe campaign`: run, resume, look at and replay campaigns."""
+"""`skillframe campaign`: run, resume, inspect and replay campaigns."""
 
 from __future__ import annotations
 
@@ -8,14 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from skillframe.cli.claims import certify, check
-from skillframe.cli.endings import TRACE
-from skillframe.cli.enter import enter
-from skillframe.cli.interrupts import terminable
-from skillframe.cli.numbers import COUNT, NATURAL, WithUnit
-from skillframe.cli.output import note, quiet_option
-from skillframe.cli.searches import break_, map_, matter
-from skillframe.config.ranges import Range
+from skillframe.cli.options import COUNT, NATURAL, TRACE, WithUnit
+from skillframe.cli.output import note, terminable
+from skillframe.config.units import Range
 
 if TYPE_CHECKING:
     from skillframe.campaign.runner import Options
@@ -36,7 +31,6 @@ def command() -> None:
 
 
 def _running(function: Callable[..., int]) -> Callable[..., int]:
-    """The options that `run` and `resume` share."""
     options = [
         click.option("--workers", type=COUNT, help="Worker processes on this machine [in-process]."),
         click.option("--scheduler", metavar="ADDRESS", help="A running Dask scheduler, e.g. tcp://10.0.0.5:8786."),
@@ -51,7 +45,7 @@ def _running(function: Callable[..., int]) -> Callable[..., int]:
     ]  # fmt: skip
     for option in reversed(options):
         function = option(function)
-    return quiet_option(function)
+    return function
 
 
 @command.command()
@@ -62,8 +56,8 @@ def run(file: Path, out: Path, as_json: bool, **settings: Any) -> int:
     """Run the campaign that FILE (campaign.toml) declares.
 
     Exit code 0; 1 if a success rate is below `[expect] rate` (or its interval not above it, with `by = "interval"`); 2
-    if something given cannot be used, or if files, memory, plug-ins or workers stop it; 130 after Ctrl-C and 143 after
-    SIGTERM. Everything that was finished is kept, and `campaign resume` goes on.
+    if an input cannot be used, or if files, memory, plug-ins or workers stop it; 130 after Ctrl-C and 143 after
+    SIGTERM. Finished trials are kept, and `campaign resume` continues.
 
     \b
     Example:
@@ -86,7 +80,7 @@ def run(file: Path, out: Path, as_json: bool, **settings: Any) -> int:
 @click.argument("folder", type=_FOLDER)
 @_running
 def resume(folder: Path, as_json: bool, **settings: Any) -> int:
-    """Run what is missing of the campaign in FOLDER. Ends in the table an uninterrupted run gives.
+    """Run what is missing of the campaign in FOLDER. The results equal those of an uninterrupted run.
 
     Exit codes as for `run`.
 
@@ -101,13 +95,13 @@ def resume(folder: Path, as_json: bool, **settings: Any) -> int:
 @click.argument("folder", type=_FOLDER)
 @click.option("--json", "as_json", is_flag=True, help="JSON alone on stdout.")
 def status(folder: Path, as_json: bool) -> int:
-    """How far the campaign in FOLDER is, and its rates so far. May be asked while it runs.
+    """Show the progress of the campaign in FOLDER and its rates so far, also while it runs.
 
     \b
     Example:
       skillframe campaign status results --json
     """
-    from skillframe.campaign.status import status_of
+    from skillframe.campaign.partial_results import status_of
     from skillframe.cli.campaign_words import show_rates
     from skillframe.cli.output import emit_json
 
@@ -143,7 +137,7 @@ def replay(folder: Path, trial: int, skill: str | None, out: Path | None) -> int
       skillframe campaign replay results 17 --skill peg --out trial17.npz
     """
     from skillframe.campaign import evaluate
-    from skillframe.campaign.replay import replay_trial
+    from skillframe.campaign.runner import replay_trial
     from skillframe.cli.output import table
     from skillframe.files import write_whole
 
@@ -163,12 +157,6 @@ def replay(folder: Path, trial: int, skill: str | None, out: Path | None) -> int
     return 1 if found.changed else 0
 
 
-command.add_command(certify)
-command.add_command(check)
-for each in (map_, break_, matter, enter):
-    command.add_command(each)
-
-
 def _options(settings: dict[str, Any]) -> Options:
     from skillframe.campaign.runner import Options
 
@@ -178,20 +166,20 @@ def _options(settings: dict[str, Any]) -> Options:
 
 
 def _go_on(folder: Path, options: Options, as_json: bool) -> int:
-    """Run what is missing and tell the outcome."""
     from skillframe.campaign import evaluate
     from skillframe.campaign.folder import load
     from skillframe.campaign.runner import run_campaign
-    from skillframe.cli.campaign_words import conclude, progress
+    from skillframe.cli.campaign_words import conclude
+    from skillframe.cli.output import campaign_progress
 
     spec = load(folder)
     if spec.trials % spec.cells:
-        from skillframe.campaign.validity import validity_of
+        from skillframe.campaign.statistics import validity_of
 
         note(f"there will be {validity_of(spec.plan, complete=True).interval_method}")
     with terminable() as code:
         try:
-            with progress() as notify:
+            with campaign_progress() as notify:
                 summary = run_campaign(folder, evaluate.evaluate, options, notify)
         except KeyboardInterrupt:
             click.echo(f"interrupted; finished rows are kept, to go on: skillframe campaign resume {folder}", err=True)

@@ -1,28 +1,25 @@
-"""What `skillframe campaign` says: how far it is while it runs, and its outcome."""
+"""Printed outcome and rates of `skillframe campaign`."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from skillframe.cli.output import emit_json, is_quiet, note, table
+from skillframe.cli.output import emit_json, note, table
 
 if TYPE_CHECKING:
-    from skillframe.campaign.runner import Progress
     from skillframe.campaign.spec import CampaignSpec
 
 
 def conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any], as_json: bool) -> int:
-    """Tell the outcome of a campaign that has ended. Returns its exit code."""
+    """Print the outcome of a campaign that has ended, and return its exit code."""
     from skillframe.campaign.folder import robot_notes
     from skillframe.campaign.summary import below_bar
+    from skillframe.robot.audit import resistance_note
     from skillframe.robot.model import load_model
-    from skillframe.robot.resistance import resistance_note
     from skillframe.robot.spec import load_robot
 
     if as_json:
@@ -69,7 +66,7 @@ def _tell_race(race: dict[str, Any], trials: int) -> None:
         click.echo(f"race: {race['best']} is the best, known after {race['looked_after']} trials")
         return
     more = f"; about {race['more']} trials more would do, if the rates stay as they are" if race["more"] else ""
-    click.echo(f"race: {', '.join(race['not_told_apart'])} are not told apart{more}")
+    click.echo(f"race: {', '.join(race['not_told_apart'])} do not differ significantly{more}")
 
 
 def _p_value(pair: dict[str, Any]) -> str:
@@ -80,8 +77,9 @@ def _p_value(pair: dict[str, Any]) -> str:
 
 
 def show_rates(skills: dict[str, dict[str, Any]]) -> None:
-    """Rates with their intervals, and the commonest causes of failure."""
-    from skillframe.reports.results import cause_of
+    """Print rates with their intervals, and the most frequent causes of failure."""
+    from skillframe.campaign.rows import cause_of
+    from skillframe.campaign.summary import refused_text
 
     rows = [
         [
@@ -95,6 +93,8 @@ def show_rates(skills: dict[str, dict[str, Any]]) -> None:
         each = "intervals, each 95 % by itself" if len(skills) > 1 else "interval"
         click.echo(f"  {method}" if method.startswith("no interval") else f"  {each}: {method}")
     for label, s in skills.items():
+        if refused := refused_text(s):
+            click.echo(f"  {label}: {refused}")
         if s["unended"]:
             click.echo(f"  {label}: {s['unended']} of its successes had reached the goal, but not ended by themselves")
         if s["uncounted"]:
@@ -108,58 +108,4 @@ def show_rates(skills: dict[str, dict[str, Any]]) -> None:
 
 
 def _trials(s: dict[str, Any]) -> str:
-    """How many trials count, with the mark of a skill that a race left out."""
     return f"{s['trials']}, left out" if "left_out_after" in s else str(s["trials"])
-
-
-@contextmanager
-def progress() -> Iterator[Callable[[Progress], None]]:
-    """A bar on a terminal, a line per tenth of the work in a pipe, both on stderr. With -q only what is unusual."""
-    import sys
-
-    if is_quiet():
-        yield lambda progress: click.echo(progress.note, err=True) if progress.note and not progress.usual else None
-        return
-    if not sys.stderr.isatty():
-        yield _lines()
-        return
-    from rich.console import Console
-    from rich.progress import Progress as Bar
-
-    console = Console(stderr=True)
-    with Bar(console=console, transient=True) as bar:
-        task = bar.add_task("runs", total=None)
-
-        def show(progress: Progress) -> None:
-            bar.update(task, completed=progress.done + progress.under_way, total=progress.total)
-            if progress.note:
-                console.print(progress.note, markup=False)
-
-        yield show
-
-
-def _lines() -> Callable[[Progress], None]:
-    """Lines with the share that is done, the runs that have ended, and a guess of what is left from the pace so far."""
-    import time
-
-    shown, began, first = -1, time.monotonic(), -1.0
-
-    def show(progress: Progress) -> None:
-        nonlocal shown, first
-        share = (progress.done + progress.under_way) / progress.total
-        first = share if first < 0.0 else first
-        if int(10 * share) > shown:
-            shown = int(10 * share)
-            spent = time.monotonic() - began
-            left = spent * (1.0 - share) / (share - first) if share > first else 0.0
-            guess = f", about {_span(left)} left" if left >= 1.0 else ""
-            click.echo(f"{share:.0%} simulated, {progress.done} of {progress.total} runs complete{guess}", err=True)
-        if progress.note:
-            click.echo(progress.note, err=True)
-
-    return show
-
-
-def _span(seconds: float) -> str:
-    """A length of time for people."""
-    return f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"

@@ -1,19 +1,19 @@
-"""What is registered, for people: names by kind, and one of them with what can be set, read off its dataclass."""
+"""Listings of registered names, and details of one, read from its dataclass."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from skillframe.config.fields import settings_of
-from skillframe.errors import UnknownName
+from skillframe.config import settings_of
+from skillframe.errors import InputError, UnknownName
 
 if TYPE_CHECKING:
     from skillframe.extend.registry import Registry
 
 
 def by_kind(provides: Sequence[str]) -> dict[str, list[str]]:
-    """Names by kind, {"worlds": ["free", ...]}, of what a plug-in provides, "world:free" and so on."""
+    """Names of a plug-in by kind, {"worlds": ["free", ...]}, from "world:free" and so on."""
     kinds: dict[str, list[str]] = {}
     for each in provides:
         kind, name = each.split(":", 1)
@@ -22,19 +22,20 @@ def by_kind(provides: Sequence[str]) -> dict[str, list[str]]:
 
 
 def found(registry: Registry, name: str) -> dict[str, Any]:
-    """What goes by a name, "peg_in_hole" or "world:peg_in_hole", as plain JSON values.
+    """Details of a name, "peg_in_hole" or "world:peg_in_hole", as JSON values.
 
     Raises:
-        UnknownName: nothing does, or several kinds do.
+        UnknownName: nothing has it.
+        InputError: several kinds do.
     """
     known = [each for plugin in registry.plugins for each in plugin.provides]
     full = [each for each in known if name in (each, each.split(":", 1)[1])]
-    if len(full) != 1:
-        raise UnknownName(
-            "name", name, full or [each.split(":", 1)[1] for each in known if not each.startswith("row:")]
-        )
+    if len(full) > 1:
+        raise InputError(name, f"is the name of {' and of '.join(full)}", f"type one of them, {full[0]}")
+    if not full:
+        raise UnknownName("name", name, [each.split(":", 1)[1] for each in known if not each.startswith("row:")])
     kind, short = full[0].split(":", 1)
-    record, plugin = getattr(registry, kind)(short), registry.provider(kind, short)
+    record, plugin = registry.record(kind, short), registry.provider(kind, short)
     given = getattr(record, "settings", None)
     settings = record.params if kind == "world" else given() if callable(given) else None
     return {
@@ -48,7 +49,7 @@ FACTS = {
     "contract": "written for contract", "unit": "unit", "axes": "axes", "checked": "checked against",
     "folder": "folder", "title": "heading",
 }  # fmt: skip
-"""Fields of records that say what one is, and what they are called for people."""
+"""Fields of records that describe one, and their headings."""
 
 
 def rows_of(registry: Registry, kind: str) -> list[dict[str, Any]]:

@@ -28,11 +28,11 @@ class Check:
     """One thing that skillframe uses.
 
     Attributes:
-        name: what it is.
+        name: of it.
         found: version or place; empty if it is missing.
         needed_for: what does not work without it.
         required: whether the core needs it.
-        fix: what to type; empty if it is there.
+        fix: command that installs it; empty if it is there.
     """
 
     name: str
@@ -45,7 +45,7 @@ class Check:
 @click.command()
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def command(as_json: bool) -> int:
-    """Say what is installed, what is missing and what to type. Exits 1 if something required is missing.
+    """Show what is installed, what is missing and what to type. Exits 1 if something required is missing.
 
     \b
     Example:
@@ -72,7 +72,7 @@ def examine() -> Iterator[Check]:
     yield from _libraries()
     yield from _extras("skillframe")
     yield _compiler()
-    yield _renderer()
+    yield from _of_plugins()
     yield _browser()
     yield _recordings()
     yield from _plugins()
@@ -86,8 +86,6 @@ def _python() -> Check:
 
 
 class _Requirement(NamedTuple):
-    """A declared dependency: its name, the lowest version, what is installed ("" for nothing), and by which extra."""
-
     name: str
     lowest: str
     found: str
@@ -102,7 +100,6 @@ class _Requirement(NamedTuple):
 
 
 def _requirements(distribution: str) -> Iterator[_Requirement]:
-    """The declared dependencies of a distribution, held against what is installed. Nothing is imported."""
     for requirement in metadata.requires(distribution) or []:
         match = re.match(r"([\w.-]+)(?:\[[\w,-]+\])?\s*(?:[<>=!,.\d]*>=\s*([\d.]+))?", requirement)
         if match is None:
@@ -116,7 +113,6 @@ def _requirements(distribution: str) -> Iterator[_Requirement]:
 
 
 def _libraries() -> Iterator[Check]:
-    """What the core cannot do without."""
     for needed in _requirements("skillframe"):
         if not needed.extra:
             fix = "" if needed.met else f"{sys.executable} -m pip install '{needed}'"
@@ -124,7 +120,6 @@ def _libraries() -> Iterator[Check]:
 
 
 def _extras(distribution: str) -> Iterator[Check]:
-    """What the extras of a distribution install, a row each. `all` is no more than the others together."""
     requirements = list(_requirements(distribution))
     for extra in dict.fromkeys(each.extra for each in requirements if each.extra not in ("", "all")):
         needed = [each for each in requirements if each.extra == extra]
@@ -133,7 +128,7 @@ def _extras(distribution: str) -> Iterator[Check]:
         yield Check(
             name=name,
             found=", ".join(f"{each.name} {each.found}" for each in needed if each.found),
-            needed_for=EXTRAS[extra] if distribution == "skillframe" else f"a part of {distribution}",
+            needed_for=EXTRAS[extra] if distribution == "skillframe" else EXTRAS.get(name, f"a part of {distribution}"),
             fix=fix,
         )
 
@@ -150,15 +145,12 @@ def _compiler() -> Check:
     return Check(name="C compiler", found=path, needed_for="building FMUs", fix=fix)
 
 
-def _renderer() -> Check:
-    """What draws videos: found out by drawing."""
-    from skillframe.reports.opengl import backend
+def _of_plugins() -> Iterator[Check]:
+    from skillframe.extend.registry import registry
 
-    there = find_spec("mujoco") is not None
-    found = backend() if there else None
-    how = "sudo apt install libosmesa6" if there else f"{sys.executable} -m pip install 'skillframe[sim]'"
-    fix = "" if found else f"{how} (videos are drawn by skillframe's own renderer until then)"
-    return Check(name="OpenGL", found=found or "", needed_for="run --video with MuJoCo's renderer", fix=fix)
+    for each in registry().records("requirement"):
+        found = each.find()
+        yield Check(name=each.name, found=found, needed_for=each.summary, fix="" if found else each.fix())
 
 
 def _browser() -> Check:
@@ -178,7 +170,6 @@ def _recordings() -> Check:
 
 
 def _provided(provides: Sequence[str]) -> str:
-    """How many of each kind: "9 worlds, 4 readers"."""
     counts = Counter(each.split(":", 1)[0] for each in provides)
     return ", ".join(f"{count} {kind}{'s' * (count != 1)}" for kind, count in counts.items()) or "nothing"
 

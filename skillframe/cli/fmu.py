@@ -1,4 +1,4 @@
-"""`skillframe fmu`: functional mock-up units, listed, built, checked and simulated."""
+"""`skillframe fmu`: functional mock-up units, listed, checked, built and simulated."""
 
 from __future__ import annotations
 
@@ -9,35 +9,41 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from skillframe.cli.numbers import WithUnit
-from skillframe.config.ranges import Range
+from skillframe.cli.groups import Listing
+from skillframe.cli.options import WithUnit, or_command
+from skillframe.config.units import Range
+from skillframe.errors import InputError
 
 if TYPE_CHECKING:
-    from skillframe.fmu.library import BuiltFmu
+    from skillframe.fmu.build import BuiltFmu
 
 _TIME = Range(-1e9, 1e9, "thirty years to either side")
 
 
-@click.group(name="fmu")
-def command() -> None:
-    """List, build, check and simulate FMUs (FMI 2 and 3).
-
-    \b
-    Example:
-      skillframe fmu simulate hydraulic_cylinder --stop 1 --step 0.001 --out out.csv
-    """
-
-
-@command.command("list")
+@click.group(name="fmu", cls=Listing)
+@click.argument("file", required=False, metavar="[FILE|NAME]", shell_complete=or_command())
+@click.option("--allow", is_flag=True, help="Let this very file run inside skillframe's process from now on.")
 @click.option("--json", "as_json", is_flag=True, help="As JSON on stdout.")
-def list_(as_json: bool) -> None:
-    """List the FMUs that are built. Name those that are not.
+def command(file: str | None, allow: bool, as_json: bool) -> int:
+    """List the FMUs (FMI 2 and 3) that are built, or check FILE: what it is, what is inside, whether it runs here.
+
+    Exit code of a check: 1 if there are problems.
 
     \b
-    Example:
-      skillframe fmu list --json
+    Examples:
+      skillframe fmu
+      skillframe fmu actuator.fmu --json
     """
-    from skillframe.fmu.library import built, fmu_folders
+    if file is not None:
+        return _check(file, as_json, allow)
+    if allow:
+        raise InputError("--allow", "is for one file", "name it")
+    _list(as_json)
+    return 0
+
+
+def _list(as_json: bool) -> None:
+    from skillframe.fmu.build import built, fmu_folders
 
     rows = built()
     if as_json:
@@ -52,17 +58,18 @@ def list_(as_json: bool) -> None:
 
 @command.command("build")
 @click.argument("names", nargs=-1, metavar="[NAME|FILE.fmu]...")
+@click.option("--out", type=click.Path(path_type=Path), metavar="FOLDER", help="Put copies there, as NAME_fmi2.fmu ...")
 @click.option("--json", "as_json", is_flag=True, help="What was built as JSON on stdout.")
-def build(names: tuple[str, ...], as_json: bool) -> int:
+def build(names: tuple[str, ...], out: Path | None, as_json: bool) -> int:
     """Build FMUs from source: all of fmus/ by default, or a foreign FMU's own sources for this machine.
 
     \b
     Example:
-      skillframe fmu build hydraulic_cylinder
+      skillframe fmu build electric_servo
     """
     from skillframe.errors import SkillframeError
-    from skillframe.fmu.foreign import build_from_sources
-    from skillframe.fmu.library import build_named, fmu_folders
+    from skillframe.fmu.build import build_named, copied, fmu_folders
+    from skillframe.fmu.check import build_from_sources
 
     rows: list[BuiltFmu] = []
     failed = 0
@@ -76,6 +83,7 @@ def build(names: tuple[str, ...], as_json: bool) -> int:
             click.echo(f"error: {error}", err=True)
             failed += 1
             continue
+        made = made if out is None else [copied(row, out) for row in made]
         rows += made
         for row in made:
             click.echo(_line(row), err=as_json)
@@ -92,24 +100,14 @@ def _line(row: BuiltFmu) -> str:
     return f"{row.name}  FMI {row.fmi_version}  {row.path}"
 
 
-@command.command("check")
-@click.argument("file")
-@click.option("--json", "as_json", is_flag=True, help="As JSON on stdout.")
-@click.option("--allow", is_flag=True, help="Let this very file run inside skillframe's process from now on.")
-def check(file: str, as_json: bool, allow: bool) -> int:
-    """Check an FMU: what it is, what is inside, whether it runs here. Exit 1 if there are problems.
-
-    \b
-    Example:
-      skillframe fmu check actuator.fmu --json
-    """
+def _check(file: str, as_json: bool, allow: bool) -> int:
+    from skillframe.fmu.build import find_fmu
     from skillframe.fmu.check import check_fmu
-    from skillframe.fmu.library import find_fmu
 
     path = find_fmu(file)
     found = check_fmu(path)
     if allow:
-        from skillframe.fmu.allow import allow as add
+        from skillframe.fmu.extract import allow as add
 
         click.echo(f"allowed: {add(path)}", err=True)
     if as_json:
@@ -120,7 +118,6 @@ def check(file: str, as_json: bool, allow: bool) -> int:
 
 
 def _print_check(path: Path, found: dict[str, Any]) -> None:
-    """What was found, one line each, then what can be connected and set, with units and start values."""
     from skillframe.cli.output import table
     from skillframe.fmu.check import confinement_in_words
     from skillframe.fmu.inspection import inspect_fmu
@@ -160,10 +157,10 @@ def simulate(
 
     \b
     Example:
-      skillframe fmu simulate hydraulic_cylinder --set command=0.1 --stop 1 --step 0.001 --out out.csv
+      skillframe fmu simulate electric_servo --set torque=0.1 --stop 1 --step 0.001 --out out.csv
     """
     from skillframe.config import parse_setting
-    from skillframe.fmu.record import simulate_to_csv
+    from skillframe.fmu.simulate import simulate_to_csv
 
     ended = simulate_to_csv(
         file, stop, step, out, table=table, settings=dict(parse_setting(text) for text in settings), limit_s=timeout

@@ -1,7 +1,7 @@
 """`skillframe`: lazily loaded commands, one module each, and the exit codes of the contract.
 
-0 fine; 1 the work ran and the answer is no; 2 usage or input error; 3 internal error. A command module is imported when
-its command is used, so that `skillframe --help` loads no scientific library. Plug-ins add commands (`extend.commands`).
+0 success; 1 the work ran and its result is negative; 2 usage or input error; 3 internal error. A command's module is
+imported on use, so that `skillframe --help` loads no scientific library. Plug-ins add commands (`extend.commands`).
 """
 
 from __future__ import annotations
@@ -19,52 +19,47 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from skillframe import __version__
+from skillframe.cli.output import quiet_option
 from skillframe.errors import SkillframeError, extras_named
 
 if TYPE_CHECKING:
     from skillframe.extend.commands import PluginCommand
 
 COMMANDS = {
-    "quickstart": "The whole way in minutes: demonstrate, learn, run, prove, report.",
-    "demonstration": "Record, check and convert demonstrations.",
-    "calibrate": "Find a force sensor's bias, tool and mounting from free air.",
-    "condition": "Filter a demonstration's wrench; remove bias and tool weight.",
+    "demo": "The whole way in minutes: demonstrate, learn, run, prove, report.",
+    "record": "Record demonstrations by a simulated teacher.",
     "segment": "Cut whole demonstrations into phases and learn a policy.",
     "learn": "Learn a skill from demonstrations.",
-    "skill": "Show and explain a learned skill.",
+    "show": "Show what a learned skill does, in words and pictures.",
     "run": "Run a skill in a simulated world.",
     "campaign": "Run a skill many times over declared uncertainty.",
-    "certify": "One file, one command: from demonstrations to a certificate.",
-    "compare": "Say which of several policies is better, from a table of trials.",
     "export": "Write a skill as settings of another controller.",
-    "report": "Make a self-contained HTML report from results.",
-    "robots": "List, check and show robots.",
-    "worlds": "List and show worlds.",
-    "skills": "List kinds of skills.",
-    "settings": "List what --set takes, with units.",
-    "fmu": "List, build, check and simulate FMUs.",
-    "plugins": "List, show, check and start plug-ins.",
+    "robots": "List robots, show and check one.",
+    "worlds": "List worlds, show one, and what --set takes there.",
+    "skills": "List kinds of skills, and show one.",
+    "fmu": "List, check, build and simulate FMUs.",
+    "plugins": "List plug-ins, and show what they bring.",
     "doctor": "What is installed, what is missing, what to type.",
 }
 
 
 NO_ARGUMENTS: Any = getattr(click.exceptions, "NoArgsIsHelpError", ())
-"""Help in place of an answer; older releases of click have no error of its own for it."""
+"""Error of a call without arguments, which prints help; older click has none."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 class LazyGroup(click.Group):
     """Commands in `skillframe.cli.<name>` and in plug-ins, imported on use. Absent modules are not listed.
 
-    A plug-in cannot take the place of a command of the core.
+    A plug-in cannot replace a command of the core.
     """
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Names of the core's commands whose module is there, then of the plug-ins'."""
+        """Names of the core's present commands, then of the plug-ins'."""
         return [*_own(), *_added()]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """The command of that name, its module imported now."""
+        """Import the command of that name."""
         if cmd_name in _own():
             command: click.Command = import_module(f"skillframe.cli.{cmd_name}").command
             return command
@@ -72,7 +67,7 @@ class LazyGroup(click.Group):
         return None if found is None else found.load()
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """The list in `--help`, made without importing a command of the core."""
+        """Write the list of `--help` without importing a command of the core."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, COMMANDS[name]) for name in _own()])
         added = [(name, command.summary()) for name, command in _added().items()]
@@ -86,16 +81,16 @@ class LazyGroup(click.Group):
             return super().make_context(*arguments, **settings)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """As click does. That the reader of our output has left, as `head` does, is no error."""
+        """As click does, but a closed output, as of `head`, is no error."""
         with _readers_may_leave():
             result = super().invoke(ctx)
             sys.stdout.flush()
             return result
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
-        """As click does, but an unknown name is answered with its plug-in's, or with the nearest one."""
-        if args and not args[0].startswith("-") and args[0] not in _own() and args[0] not in _added():
-            raise _unknown(args[0])
+        """As click does, but for an unknown name suggest its plug-in, or the nearest name."""
+        if args and not args[0].startswith("-"):
+            require_command(args[0])
         return super().resolve_command(ctx, args)
 
 
@@ -104,15 +99,23 @@ def _own() -> list[str]:
 
 
 def _added(*, selected: bool = True) -> dict[str, PluginCommand]:
-    """Commands of plug-ins, those that `SKILLFRAME_PLUGINS` selects or the others."""
     from skillframe.extend.commands import plugin_commands
 
     found = plugin_commands().items()
-    return {name: each for name, each in found if name not in COMMANDS and each.selected == selected}
+    return {n: each for n, each in found if n not in COMMANDS and "." not in n and each.selected == selected}
+
+
+def require_command(name: str) -> None:
+    """Refuse an absent command, with the line that installs it if known.
+
+    Raises:
+        SkillframeError: it is absent.
+    """
+    if name not in _own() and name not in _added():
+        raise _unknown(name)
 
 
 def _unknown(name: str) -> SkillframeError:
-    """What to say of a name that is no command here: the plug-in that has it if one is known to."""
     from skillframe.errors import UnknownName
     from skillframe.extend.homes import where_to_get
 
@@ -127,13 +130,16 @@ def _unknown(name: str) -> SkillframeError:
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
 @click.version_option(__version__, prog_name="skillframe")
+@quiet_option
 @click.option("--debug", is_flag=True, help="Show the traceback of an error.")
 def cli(debug: bool) -> None:
     """Teach robots compliant assembly from human demonstration, and prove the skill.
 
+    -q and --debug may also stand behind a command.
+
     \b
     Example:
-      skillframe quickstart --out demo
+      skillframe demo --out demo
     """
 
 
@@ -146,8 +152,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def run(arguments: Sequence[str], debug: bool = False) -> int:
-    """Run a command line and return its exit code. Messages go to stderr."""
+    """Run a command line and return its exit code. Messages go to stderr. -q may stand anywhere."""
     _print_anything()
+    quiet = [word for word in arguments if word in ("-q", "--quiet")]
+    arguments = [*quiet[:1], *(word for word in arguments if word not in quiet)]
     try:
         with extras_named():
             result = cli.main(list(arguments), prog_name="skillframe", standalone_mode=False)
@@ -176,23 +184,20 @@ def run(arguments: Sequence[str], debug: bool = False) -> int:
 
 
 def _of_usage(error: click.ClickException, arguments: Sequence[str]) -> str:
-    """What click does not understand, in the style of every other error, and where help is."""
     said = " ".join(error.format_message().split()).removesuffix(".").replace(". Did you", "; did you")
     context = getattr(error, "ctx", None)
-    typed = arguments[0] if arguments and arguments[0] in COMMANDS else ""
+    typed = next((word for word in arguments[:2] if word in COMMANDS), "")
     command = f"skillframe {typed}".strip() if context is None else context.command_path
     return f"{said[:1].lower()}{said[1:]} (help: {command} --help)"
 
 
 def _print_anything() -> None:
-    """Let both streams escape what the terminal's encoding lacks, such as a file name's bytes that are no text."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
 
 
 def _of_the_system(error: OSError | MemoryError) -> str:
-    """What the system refused, in a sentence: the file if it is known, else what was written to, and what to do."""
     if isinstance(error, MemoryError):
         return "memory ran out; give smaller files or fewer trials at a time, or free memory"
     said = error.strerror or str(error) or type(error).__name__
@@ -204,7 +209,7 @@ def _of_the_system(error: OSError | MemoryError) -> str:
 
 @contextmanager
 def _readers_may_leave() -> Iterator[None]:
-    """End with 0 where nobody reads the output any more. Click would end with 1."""
+    """Exit with 0 if the output is closed, where click would exit with 1."""
     try:
         yield
     except BrokenPipeError:
@@ -213,7 +218,7 @@ def _readers_may_leave() -> Iterator[None]:
 
 
 def _discard_output() -> None:
-    """Let what is still to be printed go nowhere: Python would try once more at its end, and fail once more."""
+    """Discard further output, as Python would fail once more on exit."""
     try:
         sys.stdout.flush()
     except OSError:

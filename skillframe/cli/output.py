@@ -1,24 +1,33 @@
-"""Listings: aligned columns for people, colours on a terminal only, and JSON alone on stdout for scripts."""
+"""Output of commands: aligned columns, colours on a terminal only, JSON alone on stdout for scripts, and progress.
+
+SIGTERM ends as Ctrl-C a command that keeps what it has finished.
+"""
 
 from __future__ import annotations
 
-import json
 import os
 import shutil
+import signal
 import sys
+import threading
 import time
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from itertools import zip_longest
 from textwrap import wrap
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+if TYPE_CHECKING:
+    from skillframe.campaign.runner import Progress
+
 
 def emit_json(value: Any) -> None:
-    """Print a value as JSON, keys sorted. Numbers that are not finite are a mistake of the caller."""
+    """Print a value as JSON with sorted keys. Numbers must be finite."""
+    import json
+
     click.echo(json.dumps(value, indent=2, sort_keys=True, allow_nan=False, ensure_ascii=False))
 
 
@@ -40,20 +49,20 @@ def _silence(ctx: click.Context, param: click.Parameter, value: bool) -> None:
 
 
 def is_quiet() -> bool:
-    """Was the command that runs told to be quiet?"""
+    """Whether the running command has `-q`."""
     context = click.get_current_context(silent=True)
     return context is not None and bool(context.meta.get(QUIET, False))
 
 
 def note(text: str) -> None:
-    """A line on stderr that is not needed. `-q` leaves it out."""
+    """Print an optional line on stderr, which `-q` leaves out."""
     if not is_quiet():
         click.echo(text, err=True)
 
 
 @contextmanager
 def warned() -> Iterator[None]:
-    """Within this, warnings of the API are lines on stderr, which `-q` leaves as they are."""
+    """While open, warnings of the API are lines on stderr, also with `-q`."""
     from skillframe.errors import SkillframeWarning
 
     with warnings.catch_warnings():
@@ -70,11 +79,11 @@ def warned() -> Iterator[None]:
         yield
 
 
-GAP = 2  # columns of blanks between the columns of a table
+GAP = 2  # blanks between the columns of a table
 LIST_WIDTH = 80
-"""Columns that a listing keeps in a pipe, too: a terminal's as it opens."""
+"""Width of a listing in a pipe, that of a new terminal."""
 PAGE_WIDTH = 110
-"""Columns of text that a page or an editor shows without breaking lines."""
+"""Width of text in pages and editors."""
 
 
 def table(columns: Sequence[str], rows: Sequence[Sequence[object]], width: int | None = None) -> None:
@@ -83,7 +92,7 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[object]], width: int |
     Args:
         columns: headings.
         rows: cells.
-        width: of the whole in a pipe; None: as wide as it is.
+        width: of the whole in a pipe; None: as wide as needed.
     """
     texts = [[str(cell) for cell in row] for row in rows]
     terminal = sys.stdout.isatty()
@@ -93,16 +102,16 @@ def table(columns: Sequence[str], rows: Sequence[Sequence[object]], width: int |
 
 
 def bold(text: str) -> str:
-    """A text in bold on a terminal, unless NO_COLOR is set, else as it is."""
+    """A text in bold on a terminal, unless NO_COLOR is set."""
     plain = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb" or not sys.stdout.isatty()
     return text if plain else click.style(text, bold=True)
 
 
 def laid_out(columns: Sequence[str], texts: Sequence[Sequence[str]], width: int | None) -> Iterator[str]:
-    """The lines of a table within a width. No word is ever broken.
+    """The lines of a table within a width, without breaking words.
 
-    What does not fit goes on below in its own column, with an empty line between rows; where the columns' longest words
-    do not fit side by side, each cell has a line, behind its heading.
+    Cells wrap in their own column, with an empty line between rows. If the columns' longest words do not fit side by
+    side, each cell has a line, behind its heading.
     """
     whole = [columns, *texts]
     natural = [max(len(line[i]) for line in whole) for i in range(len(columns))]
@@ -121,7 +130,7 @@ def laid_out(columns: Sequence[str], texts: Sequence[Sequence[str]], width: int 
 
 
 def _narrowed(natural: Sequence[int], least: Sequence[int], room: int) -> list[int]:
-    """Widths that share a room: as wide as they are, but none above a cap that makes them fit, nor below its least."""
+    """Column widths that fit a room: capped at a common width, but not below the longest word."""
 
     def capped(cap: int) -> list[int]:
         return [max(low, min(cap, n)) for n, low in zip(natural, least, strict=True)]
@@ -134,7 +143,6 @@ def _wrapped(text: str, width: int) -> list[str]:
 
 
 def _paragraphs(columns: Sequence[str], texts: Sequence[Sequence[str]], width: int) -> Iterator[str]:
-    """Rows one below the other, each cell behind its heading."""
     yield ", ".join(columns)
     for line in texts:
         yield ""
@@ -144,9 +152,9 @@ def _paragraphs(columns: Sequence[str], texts: Sequence[Sequence[str]], width: i
 
 @contextmanager
 def progress(what: str, after_s: float = 0.0) -> Iterator[Callable[[float, float], None]]:
-    """A function of how many of how many are done: a bar on a terminal, a line per tenth in a pipe, on stderr.
+    """Yields a function of the amounts done and in total: a bar on a terminal, a line per tenth in a pipe, on stderr.
 
-    Work that is over within `after_s` shows nothing in a pipe.
+    Work shorter than `after_s` shows nothing in a pipe.
     """
     if is_quiet():
         yield lambda done, total: None
@@ -172,3 +180,78 @@ def _tenths(what: str, earliest: float) -> Callable[[float, float], None]:
             click.echo(f"{done:g} of {total:g} {what}", err=True)
 
     return show
+
+
+@contextmanager
+def campaign_progress() -> Iterator[Callable[[Progress], None]]:
+    """A bar on a terminal, a line per tenth of the work in a pipe, both on stderr. With -q only unusual notes."""
+    import sys
+
+    if is_quiet():
+        yield lambda progress: click.echo(progress.note, err=True) if progress.note and not progress.usual else None
+        return
+    if not sys.stderr.isatty():
+        yield _lines()
+        return
+    from rich.console import Console
+    from rich.progress import Progress as Bar
+
+    console = Console(stderr=True)
+    with Bar(console=console, transient=True) as bar:
+        task = bar.add_task("runs", total=None)
+
+        def show(progress: Progress) -> None:
+            bar.update(task, completed=progress.done + progress.under_way, total=progress.total)
+            if progress.note:
+                console.print(progress.note, markup=False)
+
+        yield show
+
+
+def _lines() -> Callable[[Progress], None]:
+    import time
+
+    shown, began, first = -1, time.monotonic(), -1.0
+
+    def show(progress: Progress) -> None:
+        nonlocal shown, first
+        share = (progress.done + progress.under_way) / progress.total
+        first = share if first < 0.0 else first
+        if int(10 * share) > shown:
+            shown = int(10 * share)
+            spent = time.monotonic() - began
+            left = spent * (1.0 - share) / (share - first) if share > first else 0.0
+            guess = f", about {_span(left)} left" if left >= 1.0 else ""
+            click.echo(f"{share:.0%} simulated, {progress.done} of {progress.total} runs complete{guess}", err=True)
+        if progress.note:
+            click.echo(progress.note, err=True)
+
+    return show
+
+
+def _span(seconds: float) -> str:
+    return f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"
+
+
+INTERRUPTED, TERMINATED = 130, 143
+"""128 and the signal's number, the convention of shells."""
+
+
+@contextmanager
+def terminable() -> Iterator[Callable[[], int]]:
+    """While open, SIGTERM (of Slurm, systemd, a shutdown) interrupts as Ctrl-C. Yields a function for the exit code."""
+    codes = [INTERRUPTED]
+
+    def answer(number: int, frame: object) -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_IGN)  # the tables are being written
+        codes.append(TERMINATED)
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():  # Python handles signals in the main thread only
+        yield lambda: codes[-1]
+        return
+    before = signal.signal(signal.SIGTERM, answer)
+    try:
+        yield lambda: codes[-1]
+    finally:
+        signal.signal(signal.SIGTERM, before)

@@ -1,47 +1,40 @@
-"""`skillframe plugins`: list and show what is installed, check it against the contract, and start a new one."""
+"""`skillframe plugins`: list and show what is installed."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from skillframe.cli.catalog import by_kind
-from skillframe.cli.output import emit_json, note, quiet_option
+from skillframe.cli.groups import Listing
+from skillframe.cli.options import or_command
+from skillframe.cli.output import emit_json, note
 from skillframe.cli.settings import typed
-from skillframe.cli.template import EVERY, KINDS
-from skillframe.errors import UnknownName
 
 if TYPE_CHECKING:
-    from skillframe.conformance import Finding
-    from skillframe.extend.registry import Plugin, Registry
+    from skillframe.extend.registry import Registry
 
 
-@click.group()
-def command() -> None:
-    """List, show, check and start plug-ins.
-
-    \b
-    Example:
-      skillframe plugins list
-      skillframe plugins show peg_in_hole
-      skillframe plugins new my_skill
-      skillframe plugins check my_skill
-    """
-
-
-@command.command("list")
+@click.group("plugins", cls=Listing)
+@click.argument("name", required=False, shell_complete=or_command())
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-@quiet_option
-def list_(as_json: bool) -> None:
-    """List installed plug-ins: what each provides, and its error if it has one.
+def command(name: str | None, as_json: bool) -> None:
+    """List installed plug-ins: what each provides, and its error if it has one. With NAME, show what that is.
+
+    NAME is a world, skill, ... The settings shown are those that --set can change: a world's parameters, a learner's
+    settings. skillframe-testkit adds the commands that start and check a plug-in.
 
     \b
-    Example:
-      skillframe plugins list --json
+    Examples:
+      skillframe plugins
+      skillframe plugins peg_in_hole
+      skillframe plugins skill:lmc --json
     """
+    if name is not None:
+        tell_record(name, as_json)
+        return
     from skillframe.extend.registry import registry
 
     known = registry()
@@ -50,15 +43,14 @@ def list_(as_json: bool) -> None:
         emit_json(rows)
     else:
         _list(rows)
-        note("skillframe plugins show NAME says what one is, and what can be set")
-    for name in known.not_installed:
-        click.echo(f"SKILLFRAME_PLUGINS asks for {name!r}, which is not installed", err=True)
+        note("skillframe plugins NAME says what one is, and what can be set")
+    for each in known.not_installed:
+        click.echo(f"SKILLFRAME_PLUGINS names {each!r}, which is not installed", err=True)
     if known.unselected:
         click.echo(f"SKILLFRAME_PLUGINS leaves out {', '.join(known.unselected)}", err=True)
 
 
 def _list(rows: Sequence[dict[str, Any]]) -> None:
-    """A paragraph per distribution, a line per kind of what it provides."""
     for row in rows:
         click.echo(f"{row['name']} ({row['distribution']} {row['version']})")
         for kind, names in by_kind(row["provides"]).items():
@@ -67,17 +59,8 @@ def _list(rows: Sequence[dict[str, Any]]) -> None:
             click.echo(f"  error         {row['error']}")
 
 
-@command.command()
-@click.argument("name")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def show(name: str, as_json: bool) -> None:
-    """Say what a world, skill, ... is, and what --set can change: a world's parameters, a learner's settings.
-
-    \b
-    Example:
-      skillframe plugins show peg_in_hole
-      skillframe plugins show skill:lmc --json
-    """
+def tell_record(name: str, as_json: bool) -> None:
+    """Print the details of a NAME or KIND:NAME for `plugins NAME`."""
     from skillframe.cli.catalog import found
     from skillframe.extend.registry import registry
 
@@ -96,12 +79,11 @@ def show(name: str, as_json: bool) -> None:
 
 
 def _default(value: Any) -> str:
-    """As it would be typed. Nothing where the recordings decide."""
     return "" if value is None else f"={typed(value)}"
 
 
 def distribution_rows(registry: Registry) -> list[dict[str, Any]]:
-    """A row per distribution. A distribution with several plug-ins lists them together, and its commands last."""
+    """A row per distribution, with all of its plug-ins, and its commands last."""
     from skillframe.cli.main import COMMANDS
     from skillframe.extend.commands import plugin_commands
 
@@ -122,94 +104,3 @@ def distribution_rows(registry: Registry) -> list[dict[str, Any]]:
                 error = f"the command {command.name} is in {' and '.join(rivals)}, too"
                 row["error"] = f"{row['error']}; {error}" if row["error"] else error
     return list(rows.values())
-
-
-@command.command()
-@click.argument("name")
-@click.option(
-    "--out", type=click.Path(path_type=Path, file_okay=False), help="Folder to write (default: skillframe-NAME)."
-)
-@click.option(
-    "--kind",
-    "kinds",
-    multiple=True,
-    default=("skill",),
-    show_default=True,
-    type=click.Choice([*KINDS, EVERY]),
-    help="What it provides; repeat for several.",
-)
-@quiet_option
-def new(name: str, out: Path | None, kinds: tuple[str, ...]) -> None:
-    """Write a working plug-in to start from, with its conformance tests.
-
-    \b
-    Example:
-      skillframe plugins new my_skill --out my-skill
-      skillframe plugins new my_lab --kind robot --kind world
-      skillframe plugins new my_lab --kind all
-    """
-    from skillframe.cli.template import plugin_name, write_template
-
-    name = plugin_name(name)
-    folder = out or Path(f"skillframe-{name.replace('_', '-')}")
-    for path in write_template(name, folder, kinds):
-        click.echo(path)
-    note(f"next: pip install -e {folder} && skillframe plugins check {name}")
-
-
-@command.command()
-@click.argument("names", nargs=-1, metavar="[NAME]...")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def check(names: tuple[str, ...], as_json: bool) -> int:
-    """Run the conformance checks of the plug-ins named, or of all. Exits 1 if one fails.
-
-    \b
-    Example:
-      skillframe plugins check
-      skillframe plugins check my_skill --json
-    """
-    from skillframe.conformance import check_plugin
-    from skillframe.extend.registry import registry
-
-    known = registry()
-    results = [(plugin, check_plugin(known, plugin)) for plugin in _chosen(known, names)]
-    if as_json:
-        emit_json([_check_row(plugin, finding) for plugin, findings in results for finding in findings])
-    else:
-        for plugin, findings in results:
-            _say(plugin, findings)
-    return int(any(finding.problems for _, findings in results for finding in findings))
-
-
-def _chosen(registry: Registry, names: tuple[str, ...]) -> list[Plugin]:
-    """Plug-ins by their own name or their distribution's, in the order of loading."""
-    known = {alias for plugin in registry.plugins for alias in (plugin.name, plugin.distribution)}
-    for name in names:
-        if name not in known:
-            raise UnknownName("plug-in", name, [plugin.name for plugin in registry.plugins])
-    return [p for p in registry.plugins if not names or p.name in names or p.distribution in names]
-
-
-def _check_row(plugin: Plugin, finding: Finding) -> dict[str, Any]:
-    return {
-        "name": plugin.name,
-        "distribution": plugin.distribution,
-        "version": plugin.version,
-        "subject": finding.subject,
-        "checked": finding.problems is not None,
-        "problems": finding.problems or [],
-        "warnings": finding.warnings,
-    }
-
-
-def _say(plugin: Plugin, findings: list[Finding]) -> None:
-    click.echo(f"{plugin.name} ({plugin.distribution} {plugin.version})")
-    for finding in findings:
-        if finding.problems is not None:
-            click.echo(f"  {finding.subject}: {'FAILS' if finding.problems else 'passes'}")
-        for problem in finding.problems or []:
-            click.echo(f"    - {problem}")
-        for warning in finding.warnings:
-            click.echo(f"    - warning: {warning}")
-    for kind, names in by_kind([finding.subject for finding in findings if finding.problems is None]).items():
-        click.echo(f"  {kind} {', '.join(names)}: no checks for this kind")

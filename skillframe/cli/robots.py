@@ -1,4 +1,4 @@
-"""`skillframe robots`: which robots there are, whether a URDF is usable for dynamics, what a robot is like."""
+"""`skillframe robots`: list robots, show one, and check a URDF for dynamics."""
 
 from __future__ import annotations
 
@@ -7,36 +7,72 @@ from typing import TYPE_CHECKING
 
 import click
 
-from skillframe.cli import names
+from skillframe.cli import options
 
 if TYPE_CHECKING:
     from skillframe.robot.audit import Audit
-    from skillframe.robot.model import RobotModel
     from skillframe.robot.spec import RobotSpec
 
-_MASS = "The robot's mass, base included, as on its data sheet: masses that have to be guessed are scaled to it."
-_CLASS = "Instead of --mass, kind and payload in kg: cobot-3, -5, -10, -16, -20, industrial-7, -12, -25."
+_MASS = (
+    "With --check: the robot's mass, base included, as on its data sheet, or its kind and payload in kg: cobot-3, -5, "
+    "-10, -16, -20, industrial-7, -12, -25. Masses that have to be guessed are scaled to it."
+)
 
 
-@click.group()
-def command() -> None:
-    """List, check and show robots.
-
-    \b
-    Example:
-      skillframe robots check my_robot.urdf
-    """
-
-
-@command.command("list")
+@click.command()
+@click.argument("robot", required=False, metavar="[NAME|URDF]", shell_complete=options.robots)
+@click.option("--check", is_flag=True, help="Check whether it is usable for dynamics.")
+@click.option("--mass", metavar="KG|KIND", shell_complete=options.arm_classes, help=_MASS)
+@click.option("--no-meshes", is_flag=True, help="With --check: count links by their joints and other shapes alone.")
+@click.option("--keys", is_flag=True, help="List the keys of robot.toml, with default and range.")
 @click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
-def list_robots(as_json: bool) -> int:
-    """Robots that can be named: the shipped ones, those of plug-ins, and those in $SKILLFRAME_PATH/robots.
+def command(robot: str | None, check: bool, mass: str | None, no_meshes: bool, keys: bool, as_json: bool) -> int:
+    """List robots by name, or show one: joints, limits, home, mass, tool frames. --check says whether it is usable.
+
+    Listed are the shipped ones, those of plug-ins, and those in $SKILLFRAME_PATH/robots. Shown and checked is a name, a
+    URDF, or a robot.toml. In --keys, NAME stands for a joint or link, [] for each of a list.
+
+    Exit code of --check: 0 usable, 1 it loads and is not, 2 it does not load.
 
     \b
-    Example:
-      skillframe robots list --json
+    Examples:
+      skillframe robots
+      skillframe robots panda
+      skillframe robots my_robot.urdf --check --mass 33.5
     """
+    from skillframe.errors import InputError
+
+    for option, given in (("--mass", mass is not None), ("--no-meshes", no_meshes)):
+        if given and not check:
+            raise InputError(option, "is for --check", "add --check, or leave it out")
+    if keys and (robot is not None or check):
+        raise InputError("--keys", "are those of any robot.toml", "give it alone")
+    if check and robot is None:
+        raise InputError("--check", "checks one robot", "name it: skillframe robots my_robot.urdf --check")
+    if keys:
+        _keys(as_json)
+    elif robot is None:
+        _list(as_json)
+    elif check:
+        return _check(robot, mass, no_meshes, as_json)
+    else:
+        _show(robot, as_json)
+    return 0
+
+
+def _keys(as_json: bool) -> None:
+    from skillframe.api.settings import of_robot
+    from skillframe.cli.output import emit_json
+    from skillframe.cli.settings import tell_keys
+
+    rows = list(of_robot())
+    if as_json:
+        emit_json(rows)
+    else:
+        tell_keys(rows)
+
+
+def _list(as_json: bool) -> None:
     from skillframe.errors import SkillframeError
     from skillframe.robot.spec import load_robot, robot_names
 
@@ -50,43 +86,41 @@ def list_robots(as_json: bool) -> int:
         rows.append({"name": name, "path": str(folder), **about})
     if as_json:
         click.echo(json.dumps(rows, indent=2))
-        return 0
+        return
     for row in rows:
         click.echo(f"{row['name']:<14} {row['error'] or row['summary']}")
-    return 0
 
 
-@command.command()
-@click.argument("robot", metavar="URDF|NAME", shell_complete=names.robots)
-@click.option("--mass", "total_kg", type=float, metavar="KG", help=_MASS)
-@click.option("--class", "kind", metavar="NAME", shell_complete=names.arm_classes, help=_CLASS)
-@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
-def check(robot: str, total_kg: float | None, kind: str | None, as_json: bool) -> int:
-    """Is a robot usable for dynamics? A URDF, a robot.toml, or a name.
+def _kilograms(mass: str) -> float:
+    """The total mass from kilograms or a kind of arm [kg]."""
+    from skillframe.robot.link_checks import class_mass
 
-    Exit code 0: usable; 1: it loads and is not; 2: it does not load.
+    try:
+        return float(mass)
+    except ValueError:
+        return class_mass(mass)
 
-    \b
-    Example:
-      skillframe robots check my_robot.urdf --mass 33.5
-    """
+
+def _check(robot: str, mass: str | None, no_meshes: bool, as_json: bool) -> int:
     from dataclasses import replace
 
-    from skillframe.errors import InputError, SkillframeError
-    from skillframe.machine.checks.audit import audit
-    from skillframe.robot.guesses import class_mass
+    from skillframe.cli.output import note
+    from skillframe.errors import SkillframeError
+    from skillframe.extend.drives import audit
+    from skillframe.robot.bodies import without_meshes
     from skillframe.robot.model import load_model
     from skillframe.robot.spec import load_robot
 
-    if kind is not None and total_kg is not None:
-        raise InputError("--class", "and --mass say the same thing", "give one of them")
-    total_kg = total_kg if kind is None else class_mass(kind)
+    total_kg = None if mass is None else _kilograms(mass)
     try:
         spec = load_robot(robot)
         model = load_model(spec)
+        if no_meshes:
+            model = replace(model, urdf=without_meshes(model.urdf))
+            note("note: meshes are not read, so their sizes and contacts at home are not checked")
         result = audit(model, total_kg)
-        if _looks("whether bodies touch at home"):
-            from skillframe.world.collision_report import collision_problems
+        if not no_meshes and _looks("whether bodies touch at home"):
+            from skillframe.world.collisions import collision_problems
 
             result = replace(result, problems=(*result.problems, *collision_problems(model)))
     except SkillframeError as error:
@@ -101,55 +135,36 @@ def check(robot: str, total_kg: float | None, kind: str | None, as_json: bool) -
     return 0 if result.usable else 1
 
 
-@command.command()
-@click.argument("robot", metavar="NAME|URDF", shell_complete=names.robots)
-@click.option("--json", "as_json", is_flag=True, help="JSON on stdout.")
-def show(robot: str, as_json: bool) -> None:
-    """What a robot is like: joints, limits, home, mass, tool frames.
-
-    \b
-    Example:
-      skillframe robots show panda --json
-    """
+def _show(robot: str, as_json: bool) -> None:
     from skillframe.cli.output import emit_json
+    from skillframe.extend.drives import told, with_derived
     from skillframe.robot.describe import as_json as plain
     from skillframe.robot.describe import describe
     from skillframe.robot.model import load_model
     from skillframe.robot.spec import load_robot
 
     model = load_model(load_robot(robot))
-    whole, derived = _with_gains(model)
+    whole, derived = with_derived(model)
+    lines, values = told(whole.spec)
     looks = _looks("which bodies may touch")
     if looks:
-        from skillframe.world.collision_report import collision_lines, collision_values
+        from skillframe.world.collisions import collision_lines, collision_values
     if as_json:
-        emit_json({**plain(whole), "collisions": collision_values(model) if looks else None})
+        emit_json({**plain(whole, values), "collisions": collision_values(model) if looks else None})
         return
-    click.echo("\n".join([describe(whole), *(collision_lines(model) if looks else [])]))
+    click.echo("\n".join([describe(whole, lines), *(collision_lines(model) if looks else [])]))
     if derived:
-        click.echo(f"  robot.toml does not give {', '.join(derived)}: derived from masses, oil and filters")
-
-
-def _with_gains(model: RobotModel) -> tuple[RobotModel, list[str]]:
-    """A machine with the gains that follow from its figures, and their names, or unchanged where it cannot run."""
-    from skillframe.errors import SkillframeError
-    from skillframe.machine.law.gains import missing_gains, with_derived_gains
-
-    try:
-        return with_derived_gains(model), missing_gains(model.spec)
-    except SkillframeError:
-        return model, []
+        click.echo(f"  robot.toml does not give {', '.join(derived)}: its drive derives it")
 
 
 def _looks(what: str) -> bool:
-    """Whether shapes can be compared here. A note where they cannot."""
     from skillframe.cli.output import note
     from skillframe.errors import MissingDependency, need
 
     try:
         need("mujoco")
     except MissingDependency as error:
-        note(f"note: {what} is not said: {error}")
+        note(f"note: not checked: {what}: {error}")
         return False
     return True
 
@@ -175,6 +190,6 @@ def _print_audit(robot: str, result: Audit, spec: RobotSpec) -> None:
     for problem in result.problems:
         click.echo(f"\n{problem.severity} {problem.code} at {problem.where}\n  {problem.message}")
         lines = problem.fix.splitlines()
-        known = len(lines) > 1 and said.issuperset(lines[1:])  # the first one differs in what the masses add up to
+        known = len(lines) > 1 and said.issuperset(lines[1:])  # the first one depends on the sum of the masses
         click.echo("  fix: " + ("as above" if known else "\n    ".join(lines)))
         said.update(lines)

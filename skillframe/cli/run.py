@@ -5,23 +5,61 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from skillframe.cli import names
-from skillframe.cli.endings import PAGE, TRACE
-from skillframe.cli.names import robot_option, world_option
-from skillframe.cli.numbers import SEED, WithUnit
-from skillframe.cli.output import note, quiet_option
-from skillframe.config.of_runs import DURATION, TRACE_RATE
+from skillframe.cli import options
+from skillframe.cli.options import SEED, TRACE, OutputFile, WithUnit, robot_option, world_option
+from skillframe.cli.output import note
+from skillframe.config.units import DURATION, TRACE_RATE
+
+if TYPE_CHECKING:
+    from skillframe.extend.records import OutputType
 
 FORCES = ("peak_force_filtered_n", "peak_force_10ms_n", "ended_by", "goal_reached", "ended_itself")
 APART = "distance_to_collision_m"
-QUIET_S = 5.0  # a run that is over by then needs no progress
+QUIET_S = 5.0  # shorter runs need no progress
 
 
-@click.command(name="run")
+class RunCommand(click.Command):
+    """A command with an option for every kind of file that plug-ins write of a run."""
+
+    def get_params(self, ctx: click.Context) -> list[click.Parameter]:
+        """The options of the core, with those of plug-ins behind `--out`."""
+        params = super().get_params(ctx)
+        behind = next(i for i, each in enumerate(params, start=1) if each.name == "out")
+        return [*params[:behind], *map(_option, _outputs()), *params[behind:]]
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        """As click does, but for an absent plug-in's option print what to install."""
+        try:
+            return super().parse_args(ctx, args)
+        except click.NoSuchOption as error:
+            _refuse_output(error.option_name.lstrip("-"))
+            raise
+
+
+def _outputs() -> list[OutputType]:
+    from skillframe.extend.registry import registry
+
+    return [record for record in registry().records("output") if record.of == "run"]
+
+
+def _option(record: OutputType) -> click.Option:
+    kind = OutputFile(*record.endings) if record.endings else click.Path(path_type=Path)
+    return click.Option([f"--{record.name}"], type=kind, help=f"{record.summary}.")
+
+
+def _refuse_output(name: str) -> None:
+    from skillframe.extend.homes import homes
+    from skillframe.extend.registry import registry
+
+    if f"output:{name}" in homes():
+        registry().output(name)
+
+
+@click.command(name="run", cls=RunCommand)
 @click.argument("skill")
 @world_option("World to run in")
 @robot_option
@@ -35,22 +73,20 @@ QUIET_S = 5.0  # a run that is over by then needs no progress
     "settings",
     multiple=True,
     metavar="KEY=VALUE",
-    help="What differs from the nominal: start.offset_x=8mm ... (skillframe settings lists all).",
+    help="What differs from the nominal: start.offset_x=8mm ... (worlds --settings lists all).",
 )
 @click.option("--out", type=TRACE, help="Trace file (.npz).")
-@click.option("--replay", type=PAGE, help="Page with a 3-D replay and plots of the run (.html).")
-@click.option("--video", type=click.Path(path_type=Path), help="Film of the run (.mp4).")
 @click.option("--seed", default=0, show_default=True, type=SEED, help="Seed of the sensor noise.")
 @click.option(
     "--duration",
-    default=DURATION.default,
+    default=DURATION.nominal,
     show_default=True,
     type=WithUnit("s", DURATION.range),
     help="Longest run in simulated seconds.",
 )
 @click.option(
     "--rate",
-    default=TRACE_RATE.default,
+    default=TRACE_RATE.nominal,
     show_default=True,
     type=WithUnit("Hz", TRACE_RATE.range),
     help="Rate of the trace [Hz].",
@@ -60,16 +96,14 @@ QUIET_S = 5.0  # a run that is over by then needs no progress
     "scores",
     multiple=True,
     metavar="NAME",
-    shell_complete=names.scores,
-    help="A figure that a plug-in computes from the trace; repeat for several (skillframe plugins list names them).",
+    shell_complete=options.scores,
+    help="A figure that a plug-in computes from the trace; repeat for several (skillframe plugins names them).",
 )
 @click.option("--json", "as_json", is_flag=True, help="The outcome as JSON on stdout.")
-@quiet_option
 def command(
     skill: str, world: str, robot: str, coc: str | None, places: Path | None, settings: tuple[str, ...],
-    out: Path | None, replay: Path | None, video: Path | None, seed: int, duration: float, rate: float,
-    scores: tuple[str, ...],
-    as_json: bool,
+    out: Path | None, seed: int, duration: float, rate: float, scores: tuple[str, ...], as_json: bool,
+    **files: Path | None,
 ) -> int:  # fmt: skip
     """Run SKILL (a skill file, or TYPE:DEMONSTRATION) once in a simulated world.
 
@@ -85,10 +119,10 @@ def command(
     from skillframe.cli.output import progress, warned
     from skillframe.config import parse_setting
 
-    if video is not None:
-        from skillframe.reports.video import check_film, write_film
-
-        check_film(video)
+    for record in _outputs():
+        path = files[record.name]
+        if path is not None and record.check is not None:
+            record.check(path)
     with progress("s simulated", QUIET_S) as show, warned():
         done = once(
             skill, world, robot, coc=coc, set=dict(parse_setting(text) for text in settings), seed=seed,
@@ -97,34 +131,32 @@ def command(
         )  # fmt: skip
     if out is not None:
         done.save(out)
-    if replay is not None:
-        done.replay(replay)
-    if video is not None:
-        with progress("frames") as show:
-            film = write_film(done.trace, video, show)
-        note(f"note: the video was drawn by {film.renderer}")
+    for name, path in files.items():
+        if path is not None:
+            with progress("frames") as show:
+                said = done.write(name, path, show)
+            if said:
+                note(f"note: {said}")
     if done.unscored is not None:  # the run is kept
         raise done.unscored
-    _tell(done.trace.meta, {"trace": out, "replay": replay, "video": video}, as_json)
+    _tell(done.trace.meta, {"trace": out, **files}, as_json)
     if done.interrupted:
         raise KeyboardInterrupt
     return 0 if done.success else 1
 
 
 def _known(value: Any) -> Any:
-    """Of a run that diverged, what is not a number is not known. JSON has no word for it but null."""
+    """A value for JSON: None for NaN, as in a run that diverged."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _hundredths(value: float) -> str:
-    """A figure of which thousandths mean nothing, and never none."""
     return f"{value:.2f}" if value >= 0.01 else "less than 0.01"
 
 
 def _scene(meta: dict[str, Any]) -> str:
-    """Who did it where, and how far it got, where the world can say that."""
     takes, way = meta["interface"]["takes"], meta["progress"]
-    where = f"{meta['robot']}{'' if takes == 'torque' else f', told a {takes},'} in {meta['world']}"
+    where = f"{meta['robot']}{'' if takes == 'torque' else f', with {takes} commands,'} in {meta['world']}"
     if way is None:
         return where
     reached = "an unknown part" if way["reached_m"] is None else f"{way['reached_m'] * 1000:.0f}"
@@ -132,10 +164,8 @@ def _scene(meta: dict[str, Any]) -> str:
 
 
 def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) -> None:
-    from skillframe.execution.tracemeta import SHARE_JOINTS, SHARES
-    from skillframe.reports.motors import said_of_motors
-    from skillframe.reports.peaks import said
-    from skillframe.reports.second import told_of_second
+    from skillframe.execution.result import joint_shares, peak_forces, second_parts
+    from skillframe.execution.trace import SHARE_JOINTS, SHARES
 
     keys = ["success", "failure", "reason", "duration_s", "peak_force_n", "final_error_m", "final_error_rad"]
     outcome = {key: _known(meta[key]) for key in keys}
@@ -158,12 +188,12 @@ def _tell(meta: dict[str, Any], files: dict[str, Path | None], as_json: bool) ->
     ended = f"  ended after {meta['duration_s']:.2f} s ({meta['reason']})"
     if None not in outcome.values():
         missed, turned = _hundredths(meta["final_error_m"] * 1000), _hundredths(math.degrees(meta["final_error_rad"]))
-        forces = ", ".join(said(meta, "{:.1f}".format))
-        ended += f"; {forces}; {missed} mm and {turned} degrees from the goal"
+        forces = "".join(f"; {text}" for text in peak_forces(meta, "{:.1f}".format)[:1])
+        ended += f"{forces}; {missed} mm and {turned} degrees from the goal"
     click.echo(ended)
     if meta.get("second"):
-        click.echo(f"  second parts: {', '.join(told_of_second(meta['second']))}")
-    if motors := said_of_motors(meta):
+        click.echo(f"  second parts: {', '.join(second_parts(meta['second']))}")
+    if motors := joint_shares(meta):
         click.echo(f"  motors: {', '.join(motors)}")
     for name, score in (meta.get("scores") or {}).items():
         figure = "none" if score["value"] is None else f"{score['value']:.4g} {score['unit']}"

@@ -9,11 +9,13 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from skillframe.cli import names
-from skillframe.cli.endings import PAGE, SKILL
-from skillframe.cli.numbers import WHOLE
-from skillframe.cli.output import emit_json
+from skillframe.cli.options import PAGE, SKILL, WHOLE, layout_option, segmenters, skills
 from skillframe.cli.words import tell
+
+ONE_FOUND = (
+    "next: one phase was found, and no push in it; if the task has more phases, say how many (--phases 2), or draw the "
+    "boundaries on the page that --page writes"
+)
 
 
 @click.command()
@@ -22,11 +24,11 @@ from skillframe.cli.words import tell
 @click.option("--page", type=PAGE, help="HTML file to write: drag a boundary there, and it gives the line.")
 @click.option("--phases", type=WHOLE, help="Number of phases; default: it is found.")
 @click.option(
-    "--segmenter", default="wrench_hmm", show_default=True, shell_complete=names.segmenters,
-    help="How phases are told apart.",
+    "--segmenter", default="wrench_hmm", show_default=True, shell_complete=segmenters,
+    help="The plug-in that finds the phases.",
 )  # fmt: skip
 @click.option(
-    "--skill", default="lmc", show_default=True, shell_complete=names.skills,
+    "--skill", default="lmc", show_default=True, shell_complete=skills,
     help="Kind of skill that each phase is learned as.",
 )  # fmt: skip
 @click.option(
@@ -39,13 +41,14 @@ from skillframe.cli.words import tell
 @click.option("--hand", help="Where the hand held, for the work of torques; default: the recording's own, else --at.")
 @click.option(
     "--axes", type=click.Choice(["base", "phase_start"]), default="base", show_default=True,
-    help="Axes of what is learned: base, or the tool's attitude at the start.",
+    help="Axes of what is learned: base, or the tool's orientation at the start.",
 )  # fmt: skip
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="A setting of segmenter or learner.")
-@click.option("--json", "as_json", is_flag=True, help="Print the policy document as JSON on stdout as well.")
+@layout_option
 def command(
     files: tuple[Path, ...], out: Path, page: Path | None, phases: int | None, segmenter: str, skill: str,
-    boundaries: tuple[str, ...], at: str | None, hand: str | None, axes: str, settings: tuple[str, ...], as_json: bool,
+    boundaries: tuple[str, ...], at: str | None, hand: str | None, axes: str, settings: tuple[str, ...],
+    layout: Path | None,
 ) -> int:  # fmt: skip
     """Cut FILES, demonstrations of a whole task, into phases, learn each phase, and write a policy.
 
@@ -65,28 +68,34 @@ def command(
     from skillframe.extend.records import LearnOptions
     from skillframe.extend.registry import registry
 
-    registry().segmenter(segmenter)  # what is not installed is said before recordings are read
+    registry().segmenter(segmenter)  # refuse an unknown one before reading recordings
+    if page is not None:
+        registry().output("boundaries")
     values: dict[str, Any] = dict(parse_setting(text) for text in settings)
     values |= {"segmenter": segmenter, "skill": skill, "phases": phases, "set_boundary": list(boundaries)}
-    demonstrations = demonstrations_of(files)
+    demonstrations = demonstrations_of(files, layout)
     policy = segment_with(demonstrations, LearnOptions(at=at, hand=hand, axes=axes, settings=values))
     policy.save(out)
     count = len(policy.phases)
     made = f"{out}: {count} phase{'s' * (count != 1)} from {len(files)} demonstration{'s' * (len(files) != 1)}"
-    tell([made, *policy.words], err=as_json)
+    one = [ONE_FOUND] if count == 1 and phases is None and not _pushes(policy.phases[0]) else []
+    tell([made, *policy.words, *one])
     if page is not None:
-        from skillframe.files import write_whole
-        from skillframe.reports.cuts import page as page_of
+        from skillframe.extend.records import Segmentation, no_progress
 
-        write_whole(page, page_of(policy.document, policy.words, demonstrations, _line()).encode("utf-8"))
-        click.echo(f"{page}: open it in a browser, drag a boundary, and run the line that it says", err=as_json)
-    if as_json:
-        emit_json(policy.document)
+        cut = Segmentation(policy.document, policy.words, demonstrations, _line())
+        registry().output("boundaries").write(cut, page, no_progress)
+        click.echo(f"{page}: open it in a browser, drag a boundary, and run the line that it says")
     return 0
 
 
+def _pushes(phase: dict[str, Any]) -> bool:
+    return any(
+        part["desired_direction"] for part in phase.values() if isinstance(part, dict) and "desired_direction" in part
+    )
+
+
 def _line() -> str:
-    """The command as it was typed, without its `--set-boundary`."""
     context = click.get_current_context()
     words = ["skillframe", "segment", *(str(file) for file in context.params["files"])]
     for option in context.command.params:
@@ -94,8 +103,5 @@ def _line() -> str:
         if not typed or not isinstance(option, click.Option) or option.name == "boundaries":
             continue
         value, name = context.params[option.name], max(option.opts, key=len)
-        if option.is_flag:
-            words.append(name)
-        else:
-            words += [word for each in (value if option.multiple else [value]) for word in (name, str(each))]
+        words += [word for each in (value if option.multiple else [value]) for word in (name, str(each))]
     return shlex.join(words)

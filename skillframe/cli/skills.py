@@ -1,4 +1,4 @@
-"""`skillframe skills`: which kinds of skill there are, to learn and to run."""
+"""`skillframe skills`: kinds of skill, to learn and to run."""
 
 from __future__ import annotations
 
@@ -6,28 +6,35 @@ from textwrap import fill
 
 import click
 
+from skillframe.cli.options import skills
 from skillframe.cli.output import LIST_WIDTH, emit_json, table
 
 
-@click.group()
-def command() -> None:
-    """List kinds of skills. `skillframe skill` shows one that was learned.
-
-    \b
-    Example:
-      skillframe skills list
-    """
-
-
-@command.command("list")
+@click.command()
+@click.argument("name", required=False, shell_complete=skills)
 @click.option("--json", "as_json", is_flag=True, help="JSON alone on stdout.")
-def list_(as_json: bool) -> None:
-    """Kinds of skill that --skill takes and a skill file holds.
+def command(name: str | None, as_json: bool) -> None:
+    """List the kinds of skill that --skill takes and a skill file holds, or show one with its origin and settings.
+
+    `skillframe show` shows a skill that was learned.
 
     \b
-    Example:
-      skillframe skills list --json
+    Examples:
+      skillframe skills
+      skillframe skills lmc
     """
+    if name is None:
+        _list(as_json)
+        return
+    from skillframe.cli.plugins import tell_record
+    from skillframe.extend.records import CoordinatorType
+    from skillframe.extend.registry import registry
+
+    kind = "coordinator" if isinstance(registry().behaviour(name), CoordinatorType) else "skill"
+    tell_record(f"{kind}:{name}", as_json)
+
+
+def _list(as_json: bool) -> None:
     from skillframe.cli.catalog import rows_of
     from skillframe.extend.homes import install_all
     from skillframe.extend.registry import registry

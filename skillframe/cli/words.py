@@ -1,6 +1,6 @@
-"""A skill's description on a screen: long lines broken at their semicolons, under what they are about.
+"""Layout of a skill's description on a screen: long lines are broken at semicolons.
 
-Nothing is reworded: a phrase stays as its plug-in wrote it, and joined by blanks the text is the same.
+The words stay as the plug-in wrote them.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ LABEL = re.compile(r"[a-z][a-z ]{0,15}: ")
 OUTSIDE = re.compile(r"; (?![^(]*\))")
 
 
-def tell(lines: Iterable[str], *, err: bool = False) -> None:
+def tell(lines: Iterable[str]) -> None:
     """Print a description."""
     for line in laid_out(lines):
-        click.echo(line, err=err)
+        click.echo(line)
 
 
 def laid_out(lines: Iterable[str]) -> Iterator[str]:
-    """Lines of a description for a screen: details of one phase below one heading, long lines broken."""
+    """Lines of a description: details of one phase below one heading, long lines broken."""
     heading = ""
     for line in lines:
         found = PHASE.match(line)
@@ -34,7 +34,6 @@ def laid_out(lines: Iterable[str]) -> Iterator[str]:
 
 
 def _broken(line: str, margin: str) -> Iterator[str]:
-    """A line as it is, or, if it is long and says first what it is about, its phrases one below the other."""
     label = LABEL.match(line)
     phrases = OUTSIDE.split(line)
     if label is None or len(phrases) == 1 or len(margin + line) <= WIDTH:

@@ -1,39 +1,60 @@
-"""`skillframe worlds`: which worlds there are, what one of them is, and new ones of two meshes."""
+"""`skillframe worlds`: list worlds, show one, and what --set takes there."""
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
 import click
 
-from skillframe.cli import names
-from skillframe.cli.output import LIST_WIDTH, emit_json, table
+from skillframe.cli import options
+from skillframe.cli.groups import Listing
+from skillframe.cli.output import LIST_WIDTH, emit_json, note, table
+from skillframe.cli.settings import tell_settings
 from skillframe.errors import InputError
+from skillframe.files.documents import refuse_other
 
 
-@click.group()
-def command() -> None:
-    """List and show worlds, and make one of two meshes.
-
-    \b
-    Example:
-      skillframe worlds list
-      skillframe worlds show peg_in_hole
-      skillframe worlds new plug.stl socket.stl --units mm --out fixture.toml
-    """
-
-
-@command.command("list")
+@click.group("worlds", cls=Listing)
+@click.argument("world", required=False, shell_complete=options.or_command(options.worlds))
+@click.option("--settings", is_flag=True, help="List what --set takes in run, record and campaigns, with units.")
+@click.option(
+    "--pictures", metavar="FOLDER", type=click.Path(path_type=Path),
+    help="Draw WORLD, or every world, as FOLDER/NAME.png: the scene at its start, cut open.",
+)  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="JSON alone on stdout.")
-def list_(as_json: bool) -> None:
-    """Worlds that --world takes by name. It takes the path of a fixture file as well (skillframe worlds new).
+def command(world: str | None, settings: bool, pictures: Path | None, as_json: bool) -> None:
+    """List the worlds that --world takes, or show WORLD: its parameters, where a run starts, the points of its tool.
+
+    WORLD may be a fixture file, too. It then says what is found in the parts, or why they are refused. With --settings
+    it lists every quantity that --set takes there, or in all worlds, with default and range. A bare number is in SI
+    units; 8mm, 5deg, 20N say their own. A number beyond the range is refused as a typing mistake. A learner's settings:
+    skillframe skills NAME.
 
     \b
-    Example:
-      skillframe worlds list --json
+    Examples:
+      skillframe worlds
+      skillframe worlds peg_in_hole --settings
+      skillframe worlds --pictures worlds
+      skillframe worlds parts/fixture.toml --pictures parts
     """
+    if pictures is not None and settings:
+        raise InputError("--pictures", "draws worlds, and --settings lists their settings", "give one of the two")
+    if pictures is not None:
+        _draw(world, pictures)
+    if settings:
+        rows = _settings(world)
+        if as_json:
+            emit_json(rows)
+        else:
+            tell_settings(rows)
+    elif world is None:
+        _list(as_json)
+    else:
+        _show(world, as_json)
+
+
+def _list(as_json: bool) -> None:
     from skillframe.cli.catalog import rows_of
     from skillframe.extend.registry import registry
 
@@ -45,38 +66,38 @@ def list_(as_json: bool) -> None:
         table(("world", "what it is", "from"), lines, LIST_WIDTH)
 
 
-@command.command()
-@click.argument("world", shell_complete=names.worlds)
-@click.option("--picture", type=click.Path(path_type=Path), help="PNG to draw: the scene at its start, cut open.")
-@click.option("--json", "as_json", is_flag=True, help="JSON alone on stdout.")
-def show(world: str, picture: Path | None, as_json: bool) -> None:
-    """What a world is: its parameters, where a run starts, and the points of its tool.
-
-    \b
-    Example:
-      skillframe worlds show peg_in_hole
-      skillframe worlds show parts/fixture.toml --picture parts.png
-    """
-    from skillframe.api.settings import of_world
-    from skillframe.cli.settings import typed
+def _settings(world: str | None) -> list[dict[str, Any]]:
+    from skillframe.api.settings import of_trials, settings_of_world
     from skillframe.extend.registry import registry
-    from skillframe.extend.worlds import make_scene
 
+    worlds = [registry().world(world)] if world is not None else list(registry().records("world"))
+    return [*of_trials(), *(row for record in worlds for row in settings_of_world(record))]
+
+
+def _show(world: str, as_json: bool) -> None:
+    from skillframe.api.settings import settings_of_world
+    from skillframe.cli.settings import typed
+    from skillframe.extend.records import make_scene
+    from skillframe.extend.registry import registry
+
+    refuse_other(Path(world), "fixture")
+    read = registry().world_file().found if world.endswith(".toml") else None
+    parts, values = ([], None) if read is None else read(Path(world), note)
     record = registry().world(world)
     origin = world if world.endswith(".toml") else registry().provider("world", world).distribution
-    scene, settings = make_scene(record, {}), list(of_world(record))
+    scene, settings = make_scene(record, {}), list(settings_of_world(record))
     found: dict[str, Any] = {
         "name": world, "summary": record.summary, "distribution": origin,
         "settings": settings, "start_tip_m": list(scene.start_tip), "frames": scene.tool.frames,
         "depth_m": None if scene.way is None else scene.way.of_m, "sprung": [part.name for part in scene.sprung],
-        "second_arm_holds_it": scene.holder is not None,
+        "second_arm_holds_it": scene.holder is not None, "parts": values,
     }  # fmt: skip
-    if picture is not None:
-        _draw(scene, picture)
     if as_json:
         emit_json(found)
         return
     click.echo(f"{scene.name} ({found['distribution']}): {record.summary}")
+    for line in parts:
+        click.echo(f"  {line}")
     click.echo(f"  the tip starts at {_point(scene.start_tip)} mm in the fixture frame, z up")
     for name, point in scene.tool.frames.items():
         click.echo(f"  {name} at {_point(point)} mm in the tool frame")
@@ -92,91 +113,12 @@ def _point(point: tuple[float, ...]) -> str:
     return ", ".join(f"{1000.0 * each:g}" for each in point)
 
 
-@command.command()
-@click.argument("plug", type=click.Path(path_type=Path))
-@click.argument("socket", type=click.Path(path_type=Path))
-@click.option("--units", help='Of both files, as "mm"; needed for all but GLB and STEP.')
-@click.option(
-    "--out", default="fixture.toml", show_default=True, type=click.Path(path_type=Path), help="File to write."
-)
-@click.option(
-    "--friction", default=0.2, show_default=True, type=click.FloatRange(0.0, 5.0), help="Coulomb coefficient."
-)
-@click.option(
-    "--axis", default="auto", show_default=True,
-    help='Of insertion, as "[0, 0, -1]"; auto takes the first of -z, z, -x, x, -y, y that is free.',
-)  # fmt: skip
-def new(plug: Path, socket: Path, units: str | None, out: Path, friction: float, axis: str) -> None:
-    """Make a world of two meshes, PLUG (held) and SOCKET (standing), assembled as they were exported.
+def _draw(world: str | None, folder: Path) -> None:
+    from skillframe.extend.records import make_scene, no_progress
+    from skillframe.extend.registry import registry
 
-    Writes a fixture file and prints what is found: depth, clearance, way out, contact error. The meshes have to lie in
-    the file's folder.
-
-    \b
-    Example:
-      skillframe worlds new plug.stl socket.stl --units mm
-    """
-    from skillframe.files import write_whole
-    from skillframe.parts.found import lines, needs_units, new_text, relative
-    from skillframe.parts.load import load
-
-    if out.suffix != ".toml":
-        raise InputError(out, "is to be named .toml, as --world knows such files by", "choose another --out")
-    if out.exists():
-        raise InputError(out, "exists", "choose another --out, or edit it")
-    if not out.parent.is_dir():
-        raise InputError(out, f"cannot be written: there is no folder {out.parent}", "make it first")
-    names_of_both = relative(plug, out), relative(socket, out)
-    if units is None and needs_units(*names_of_both):
-        unsaid = " and ".join(each.name for each in (plug, socket) if needs_units(each.name))
-        raise InputError("--units", f"is missing: nothing is said of it in {unsaid}", "give for example --units mm")
-    text = new_text(out.name, *names_of_both, units, friction, _axis(axis))
-    write_whole(out, text.encode())
-    try:
-        found = lines(load(out))
-    except BaseException:
-        out.unlink(missing_ok=True)  # nobody wants a file of parts that are refused
-        raise
-    click.echo("\n".join([f"{out} written", *found]))
-
-
-def _axis(said: str) -> str:
-    """`--axis` as TOML: three numbers, or "auto"."""
-    import json
-
-    try:
-        found = said if said == "auto" else [float(each) for each in json.loads(said)]
-    except (ValueError, TypeError):
-        found = []
-    if said != "auto" and (len(found) != 3 or not any(found) or not all(math.isfinite(float(x)) for x in found)):
-        raise InputError(f"--axis {said!r}", "is no direction", 'give three numbers as "[0, 0, -1]", or auto')
-    return json.dumps(found)
-
-
-@command.command()
-@click.argument("file", type=click.Path(path_type=Path))
-@click.option("--json", "as_json", is_flag=True, help="JSON alone on stdout.")
-def check(file: Path, as_json: bool) -> None:
-    """What is found in the two parts of a fixture FILE, or why they are refused (exit code 2).
-
-    \b
-    Example:
-      skillframe worlds check fixture.toml
-    """
-    from skillframe.parts.found import lines, values
-    from skillframe.parts.load import load
-
-    loaded = load(file)
-    if as_json:
-        emit_json(values(loaded))
-    else:
-        click.echo("\n".join(lines(loaded)))
-
-
-def _draw(scene: Any, picture: Path) -> None:
-    from skillframe.api.pictures import picture_of
-    from skillframe.files import write_whole
-
-    if picture.suffix.lower() != ".png":
-        raise InputError(f"--picture {picture}", "is no PNG", "name it .png")
-    write_whole(picture, picture_of(scene))
+    draw = registry().output("scene").write
+    records = registry().records("world") if world is None else [registry().world(world)]
+    folder.mkdir(parents=True, exist_ok=True)
+    for record in records:
+        draw(make_scene(record, {}), folder / f"{Path(record.name).stem}.png", no_progress)

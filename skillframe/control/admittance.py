@@ -1,16 +1,24 @@
-r"""The admittance law: what to tell an arm that takes velocities or positions, so that it acts as an impedance.
+"""Admittance controller: motion commands that make a position- or velocity-controlled arm act as an impedance.
 
     M dv/dt + D (v - v_d) + K (x_c - x_d) = f_ff + f_ext                                                      (1)
     v  <-  v + (M + h D + h^2 K)^-1 h [ K (e - h v) + D (v_d - v) + f_ff + f_ext ],     e = x_d - x_c         (2)
 
-x_c is the pose of the joints as commanded, not as measured, f_ext the filtered wrench of the environment on the tool.
-(1) is the loop's impedance read the other way round, force in and motion out. (2) is (1) by an implicit Euler step of
-h, stable for every D and K at any rate, where an explicit one needs h D < 2 M. Our choices:
+x_c is the pose of the commanded joints, f_ext the filtered wrench of the environment on the tool. (2) solves (1) by an
+implicit Euler step h, which is stable for every D and K; an explicit step needs h D < 2 M. In addition:
 
 - the skill's damping is raised to a floor that keeps contact stable (`skillframe.robot.interface`);
-- the drive K e + D v_d + f_ff is cut to the push that robot.toml allows, force and torque each: D v_d alone, at
-  2000 Ns/m and 20 mm/s, is 40 N that no limit of the skill knows of;
-- while no contact is felt (below 0.5 N and 0.03 Nm) the wrench counts as none, so that a tare's error makes no drift.
+- force and torque of the drive K e + D v_d + f_ff are limited to the push of robot.toml;
+- a wrench below 0.5 N and 0.03 Nm counts as zero, so that a tare error causes no drift.
+
+Contact rings where the surroundings are stiffer than the controller was designed for:
+
+    f_s' = (f - f_s) / (2 T_tot),     up <- max(f - f_s, up exp(-h / (5 T_tot))),     down the same of f_s - f
+    a = |min(up, down)|, axis by axis,     rings where a > share * push
+
+A controller with too little damping rings at 1 / (4 T_tot) or slightly faster. f_s is the slow part of the force, a
+the amplitude, remembered for about a period. A one-sided force, as at every touch, does not count. Raising an
+admittance's damping while its force rings follows Dimeas and Aspragathos, IEEE Transactions on Haptics 9 (2016), who
+use the spectrum.
 """
 
 from __future__ import annotations
@@ -18,30 +26,67 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from skillframe.control.impedance import critical_damping, pose_error, raised_damping
-from skillframe.control.ringing import RingWatch
-from skillframe.control.ticks import LawSettings, compiled_admittance
+from skillframe.control.impedance import critical_damping, raised_damping
+from skillframe.control.ticks import LawSettings, compiled, compiled_admittance
 from skillframe.errors import InputError
-from skillframe.frames import Float, Pose, norm
+from skillframe.frames import Float, Pose, dot, norm, pose_error
 from skillframe.robot.interface import VIRTUAL_INERTIA, VIRTUAL_MASS
 from skillframe.skill import Command, Impedance
 
+SLOW, MEMORY = 2.0, 5.0
+"""Time constants of f_s and a in T_tot: 0.5 and 1.25 periods of a ringing of 1 / (4 T_tot)."""
+SHARE = 0.1
+"""Ringing amplitude as a share of the push: 2 N of 20 N, far above a wrist sensor's noise."""
+
+
+class RingWatch:
+    """The detector of N independent trials, with step h = `dt` [s], T_tot = `delay` [s] and the push [N]."""
+
+    def __init__(self, count: int, dt: float, delay: float, push: float) -> None:
+        self._follow = -float(np.expm1(-dt / (SLOW * delay)))
+        self._fade = float(np.exp(-dt / (MEMORY * delay)))
+        self._least = SHARE * push
+        self._slow, self._up, self._down, self._both, self._force = np.zeros((5, count, 3))
+        self._move = compiled("rung", {
+            "slow": self._slow, "up": self._up, "down": self._down, "least": self._both, "force": self._force,
+            "follow": self._follow, "fade": self._fade, "numbers": self._slow.size,
+        }) or self._move_in_numpy  # fmt: skip
+        self.amplitude = np.zeros(count)
+
+    def look(self, force: Float) -> NDArray[np.bool_]:
+        """Return which contacts ring (N,), given the current forces (N, 3)."""
+        self._force[:] = force
+        self._move()
+        self.amplitude = norm(self._both)
+        result: NDArray[np.bool_] = self.amplitude > self._least
+        return result
+
+    def _move_in_numpy(self) -> int:
+        off = self._force - self._slow
+        self._slow += self._follow * off
+        self._up[:] = np.maximum(off, self._fade * self._up)
+        self._down[:] = np.maximum(-off, self._fade * self._down)
+        np.minimum(self._up, self._down, out=self._both)
+        return 0
+
+
 QUIET_FORCE, QUIET_TORQUE = 0.5, 0.03
-"""[N, Nm] below which no contact is felt: five times what the filter leaves of a wrist sensor's noise (ours)."""
+"""Contact threshold [N, Nm]: five times the noise of a filtered wrist sensor."""
 CALMING = 4.0
-"""Times the damping where contact rings: stable up to four times the stiffness that was declared (ours)."""
+"""Factor on the damping while contact rings. It keeps contact stable up to four times the declared stiffness."""
 QUIET = np.array([QUIET_FORCE, QUIET_TORQUE]) ** 2
 MASS = np.diag(np.repeat([VIRTUAL_MASS, VIRTUAL_INERTIA], 3))
 
 
 class Bounds(NamedTuple):
-    """What keeps the law stable and gentle.
+    """Limits that keep the controller stable and gentle.
 
     Attributes:
         floor: least damping along any axis [Ns/m, Nms/rad].
         push: largest drive [N, Nm].
-        stiffness: of what the arm may touch and of itself in series [N/m]; a skill cannot be stiffer.
+        stiffness: of arm and surroundings in series [N/m]; the skill may not be stiffer.
     """
 
     floor: tuple[float, float]
@@ -50,13 +95,9 @@ class Bounds(NamedTuple):
 
 
 class AdmittanceLaw:
-    """The law of N trials. Rows are independent of each other.
+    """The controller of N independent trials, with step h = `dt` [s].
 
-    Args:
-        count: N.
-        dt: h [s], between two commands.
-        bounds: of the arm.
-        watch: for contact that rings, which is damped `CALMING` times as much. None damps all alike.
+    While `watch` finds ringing contact, damping is raised by `CALMING`; without it damping is constant.
     """
 
     def __init__(self, count: int, dt: float, bounds: Bounds, watch: RingWatch | None = None) -> None:
@@ -64,56 +105,37 @@ class AdmittanceLaw:
         self._impedance: Impedance | None = None
         self._compiled = compiled_admittance(count, LawSettings(dt, bounds.push, QUIET))
         self.twist = np.zeros((count, 6))
-        """(N, 6) v of the centre of compliance, base axes. Who moves the joints writes here what they really do."""
+        """Velocity v (N, 6) of the centre of compliance, base axes. Set it to the motion that the joints make."""
 
     def step(self, command: Command, pose: Pose, wrench: Float, ramp: float = 1.0) -> Float:
-        """Move v on by a step, and give the law's wrench (N, 6) on the tool: drive less damping.
+        """Advance v by one step and return the controller's wrench (N, 6) on the tool, drive minus damping.
 
-        Args:
-            command: what the skill wants.
-            pose: of the centre of compliance at the commanded joints.
-            wrench: (N, 6) of the environment on the tool there, base axes.
-            ramp: 0 ... 1 fades desired twist and feed-forward in.
+        `pose` is at the commanded joints, `wrench` (N, 6) acts there on the tool, both in base axes. `ramp`, 0 to 1,
+        scales desired twist and feed-forward.
 
         Raises:
-            InputError: the skill is stiffer than the arm can be.
+            InputError: the skill is stiffer than the arm.
         """
         self._design(command.impedance)
-        damping, gain = self._now(wrench)
-        drive, force = self._forces(command, pose, wrench, ramp, damping)
-        self.twist = self.twist + _times(gain, force)
-        law: Float = drive - _times(damping, self.twist)
-        return law
-
-    def _forces(self, command: Command, pose: Pose, wrench: Float, ramp: float, damping: Float) -> tuple[Float, Float]:
-        """The drive (N, 6), held to the push, and all forces together."""
+        damping, gain = self._damping, self._gain
+        if self._watch is not None and np.count_nonzero(rings := self._watch.look(wrench[:, :3])):
+            chosen = rings[:, None, None]
+            damping, gain = np.where(chosen, CALMING * damping, damping), np.where(chosen, self._calm, gain)
         if (law := self._compiled) is not None and law.strayed(command.pose, pose, self.twist):
             law.find(command, wrench, ramp, (self._stiffness, self._damping, damping))
-            return law.drive, law.force
-        error = pose_error(command.pose, pose) - self._dt * self.twist
-        wanted = _times(self._damping, command.twist) + command.feedforward
-        drive = self._cut(_times(self._stiffness, error) + ramp * wanted)
-        return drive, drive - _times(damping, self.twist) + felt(wrench)
-
-    def _now(self, wrench: Float) -> tuple[Float, Float]:
-        """Damping and step matrix, those of the trials whose contact rings with more damping."""
-        if self._watch is None:
-            return self._damping, self._gain
-        rings = self._watch.look(wrench[:, :3])
-        if not np.count_nonzero(rings):
-            return self._damping, self._gain
-        chosen = rings[:, None, None]
-        return np.where(chosen, CALMING * self._damping, self._damping), np.where(chosen, self._calm, self._gain)
-
-    def _cut(self, drive: Float) -> Float:
-        """Force and torque held to the push, each in its direction."""
-        halves = drive.reshape(-1, 2, 3)
-        share = norm(halves) / self._bounds.push
-        result: Float = (halves / np.maximum(share, 1.0)[..., None]).reshape(-1, 6)
-        return result
+            drive, force = law.drive, law.force
+        else:
+            error = pose_error(command.pose, pose) - self._dt * self.twist
+            wanted = _times(self._damping, command.twist) + command.feedforward
+            halves = (_times(self._stiffness, error) + ramp * wanted).reshape(-1, 2, 3)
+            share = norm(halves) / self._bounds.push
+            drive = (halves / np.maximum(share, 1.0)[..., None]).reshape(-1, 6)
+            force = drive - _times(damping, self.twist) + felt(wrench)
+        self.twist = self.twist + _times(gain, force)
+        asked: Float = drive - _times(damping, self.twist)
+        return asked
 
     def _design(self, impedance: Impedance) -> None:
-        """Damping and step matrix for an impedance, when another one comes."""
         last, (stiffness, damping) = self._impedance, impedance
         if last is not None and _same(last.stiffness, stiffness) and _same(last.damping, damping):
             return
@@ -139,22 +161,22 @@ class AdmittanceLaw:
         largest = float(np.linalg.eigvalsh(0.5 * (part + part.mT)).max())
         if largest > self._bounds.stiffness:
             text = (
-                f"the skill asks for {largest:.3g} N/m, and arm, sensor and part together yield with "
+                f"the skill commands {largest:.3g} N/m, and arm, sensor and part together yield with "
                 f"{self._bounds.stiffness:.3g} N/m (contact_stiffness): the interface cannot hold it"
             )
             raise InputError("control.interface", text, "learn or write a softer skill, or measure contact_stiffness")
 
 
 def felt(wrench: Float) -> Float:
-    """Wrenches (N, 6), none where no contact is felt."""
+    """Return wrenches (N, 6), zero where they are below the contact threshold."""
     halves = wrench.reshape(-1, 2, 3)
-    touching = (np.vecdot(halves, halves) > QUIET).any(-1)
+    touching = np.any(dot(halves, halves) > QUIET, axis=-1)
     result: Float = wrench * touching[:, None]
     return result
 
 
 def _times(matrix: Float, vector: Float) -> Float:
-    """Matrices (6, 6) or (N, 6, 6) times vectors (N, 6), row by row."""
+    """Matrices (6, 6) or (N, 6, 6) times vectors (N, 6)."""
     result: Float = (matrix @ vector[..., None])[..., 0]
     return result
 

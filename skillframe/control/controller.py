@@ -1,8 +1,9 @@
-"""From a skill's command to generalised forces: equation (1), gravity and Coriolis forces, and a quiet null space.
+"""Impedance controller: generalised forces for a skill's command.
 
     tau = J^T F + h + tau_null,    F from equation (1)
 
-Damping that the skill leaves open is designed from the task-space inertia whenever a row's stiffness changes.
+h is gravity and Coriolis forces, tau_null damps the null space. Where the skill gives no damping, critical damping is
+designed from the task-space inertia whenever the stiffness changes.
 """
 
 from __future__ import annotations
@@ -17,12 +18,12 @@ from skillframe.control.ticks import compiled_impedance
 from skillframe.frames import Float, Pose
 from skillframe.skill import Command, Impedance
 
-NULL_SPACE_DAMPING = 10.0  # 1/s; ours: settles the elbow within half a second
+NULL_SPACE_DAMPING = 10.0  # 1/s; settles the elbow within half a second
 REFRESH = 40  # ticks between two null-space projectors; the posture hardly changes in 40 ms
 
 
 class Reading(NamedTuple):
-    """What the controller reads of N robots at a tick, at the centre of compliance.
+    """State of N robots at a tick, at the centre of compliance.
 
     Attributes:
         pose: measured.
@@ -30,7 +31,7 @@ class Reading(NamedTuple):
         jacobian: (N, 6, nv) base axes.
         bias: (N, nv) gravity, Coriolis and centrifugal generalised forces of the nominal model.
         velocity: (N, nv).
-        mass_matrix: gives (N, nv, nv) of the nominal model; called only when it is needed.
+        mass_matrix: returns (N, nv, nv) of the nominal model; called only when needed.
     """
 
     pose: Pose
@@ -42,7 +43,7 @@ class Reading(NamedTuple):
 
 
 class ImpedanceController:
-    """The control law of N trials. Rows are independent of each other."""
+    """The controller of N independent trials."""
 
     def __init__(self, count: int) -> None:
         self._count, self._compiled = count, compiled_impedance(count)
@@ -52,39 +53,34 @@ class ImpedanceController:
         self._tick = 0
 
     def torque(self, command: Command, reading: Reading, ramp: float = 1.0) -> tuple[Float, Float]:
-        """Generalised forces (N, nv), and the law's wrench (N, 6) on the tool.
+        """Return generalised forces (N, nv), and the controller's wrench (N, 6) on the tool.
 
-        Args:
-            command: what the skill wants.
-            reading: what the robots do.
-            ramp: 0 ... 1 fades desired twist and feed-forward in, so that a start is bumpless.
+        `ramp`, 0 to 1, scales desired twist and feed-forward for a smooth start.
         """
-        law = self._wrench(command, reading, ramp)
+        damping = self.damping_for(command.impedance, reading)
+        law = None
+        if self._compiled is not None:
+            law = self._compiled.wrench(command, reading.pose, reading.twist, damping, ramp)
+        if law is None:
+            law = impedance_wrench(
+                command.pose, reading.pose, ramp * command.twist - reading.twist, command.impedance.stiffness, damping,
+                ramp * command.feedforward,
+            )  # fmt: skip
         torque: Float = (reading.jacobian.mT @ law[..., None])[..., 0]
         torque += reading.bias
         if reading.velocity.shape[-1] > 6:
-            torque += self._null_space(reading)
+            if self._tick % REFRESH == 0:
+                self._projector = null_space_damping(reading.jacobian, reading.mass_matrix(), NULL_SPACE_DAMPING)
+            self._tick += 1
+            torque += (self._projector @ reading.velocity[..., None])[..., 0]
         return torque, law
 
-    def _wrench(self, command: Command, reading: Reading, ramp: float) -> Float:
-        """Equation (1)."""
-        damping = self._damping_for(command.impedance, reading)
-        if (law := self._compiled) is not None:
-            wrench = law.wrench(command, reading.pose, reading.twist, damping, ramp)
-            if wrench is not None:
-                return wrench
-        return impedance_wrench(
-            command.pose, reading.pose, ramp * command.twist - reading.twist, command.impedance.stiffness, damping,
-            ramp * command.feedforward,
-        )  # fmt: skip
-
-    def _damping_for(self, impedance: Impedance, reading: Reading) -> Float:
-        """The skill's damping, or critical damping designed again for the rows whose stiffness has changed."""
+    def damping_for(self, impedance: Impedance, reading: Reading) -> Float:
+        """The impedance's damping (N, 6, 6), or the one that is designed for its stiffness."""
         if impedance.damping is not None:
             return impedance.damping
         stiffness = impedance.stiffness
-        last = np.full((6, 6), np.nan) if self._designed_for is None else self._designed_for
-        differs = stiffness != last
+        differs = stiffness != (np.nan if self._designed_for is None else self._designed_for)
         if not np.count_nonzero(differs):
             return self._damping
         shape = (self._count, 6, 6)
@@ -94,10 +90,3 @@ class ImpedanceController:
         self._damping[changed] = critical_damping(np.broadcast_to(stiffness, shape)[changed], inertia)
         self._designed_for = np.array(stiffness)
         return self._damping
-
-    def _null_space(self, reading: Reading) -> Float:
-        if self._tick % REFRESH == 0:
-            self._projector = null_space_damping(reading.jacobian, reading.mass_matrix(), NULL_SPACE_DAMPING)
-        self._tick += 1
-        result: Float = (self._projector @ reading.velocity[..., None])[..., 0]
-        return result

@@ -1,41 +1,29 @@
-r"""Cartesian impedance, equation (1) of the overview paper with the damping sign that dissipates.
+r"""Cartesian impedance, equation (1) of the overview paper, with the damping sign that dissipates.
 
-    F = K (x_d - x) + D (v_d - v) + F_ff,    x: position and attitude of the centre of compliance
+    F = K (x_d - x) + D (v_d - v) + F_ff,    x: position and orientation of the centre of compliance
 
-The attitude error is the rotation vector of R_d R^T in base axes. As printed, "+ D v" would only dissipate for a
-negative D; here D acts on desired minus measured twist and is positive definite. Critical damping is designed from the
-task-space inertia L = (J M^-1 J^T)^-1 by D = 2 zeta L^(1/2) (L^(-1/2) K L^(-1/2))^(1/2) L^(1/2), the matrix form of
-d = 2 zeta sqrt(k m), with a floor so that compliant axes (K = 0) are damped too (the floor is ours).
+The orientation error is the rotation vector of R_d R^T in base axes. The printed "+ D v" dissipates only for a negative
+D; here D is positive definite and acts on desired minus measured twist. Critical damping uses the task-space inertia
+L = (J M^-1 J^T)^-1: D = 2 zeta L^(1/2) (L^(-1/2) K L^(-1/2))^(1/2) L^(1/2), the matrix form of d = 2 zeta sqrt(k m).
+A floor damps compliant axes (K = 0) too.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from skillframe.frames import Float, Pose, rotation_vector
+from skillframe.frames import Float, Pose, pose_error
 
 DAMPING_FLOOR = (20.0, 0.3)
-"""Least damping along any axis [Ns/m, Nms/rad]; ours, from lmc trials with a 2.6 kg tool."""
-
-
-def pose_error(desired: Pose, measured: Pose) -> Float:
-    """Desired minus measured as (N, 6): metres, then the rotation vector of R_d R^T, both in base axes."""
-    turn = desired.rotation @ np.swapaxes(measured.rotation, -1, -2)
-    return np.concatenate([desired.position - measured.position, rotation_vector(turn)], axis=-1)
+"""Least damping along any axis [Ns/m, Nms/rad], chosen for a 2.6 kg tool."""
 
 
 def impedance_wrench(
     desired: Pose, measured: Pose, twist_error: Float, stiffness: Float, damping: Float, feedforward: Float
 ) -> Float:
-    """Equation (1): the wrench (N, 6) of the robot on its tool at the centre of compliance, base axes.
+    """Wrench (N, 6) of the robot on its tool at the centre of compliance, base axes, by equation (1).
 
-    Args:
-        desired: pose of the centre of compliance that the skill wants.
-        measured: pose that the sensors give.
-        twist_error: (N, 6) desired minus measured twist.
-        stiffness: (N, 6, 6) or (6, 6).
-        damping: same.
-        feedforward: (N, 6).
+    Twist error and feed-forward are (N, 6); stiffness and damping are (6, 6) or (N, 6, 6).
     """
     error = pose_error(desired, measured)
     wrench: Float = (stiffness @ error[..., None])[..., 0] + (damping @ twist_error[..., None])[..., 0] + feedforward
@@ -52,16 +40,10 @@ def task_inertia(jacobian: Float, mass_matrix: Float) -> Float:
 def critical_damping(
     stiffness: Float, inertia: Float, ratio: float = 1.0, floor: tuple[float, float] = DAMPING_FLOOR
 ) -> Float:
-    """Damping matrices (N, 6, 6) of a damping ratio for a stiffness and task inertia, with a floor.
+    """Damping matrices (N, 6, 6) for a damping ratio, a stiffness (..., 6, 6) and a task inertia (N, 6, 6).
 
-    The translational and rotational parts are designed apart (the block diagonal of Lambda), so that the axes of each
-    keep their meaning; the floor raises eigenvalues below it.
-
-    Args:
-        stiffness: (N, 6, 6) or (6, 6).
-        inertia: (N, 6, 6) task-space inertia.
-        ratio: zeta, 1 is critical.
-        floor: least eigenvalue of the translational [Ns/m] and rotational [Nms/rad] part.
+    Translation and rotation are designed separately, from the diagonal blocks of Lambda. `floor` is the least
+    eigenvalue of each [Ns/m, Nms/rad].
     """
     shape = np.broadcast_shapes(stiffness.shape, inertia.shape)
     damping = np.zeros(shape)
@@ -74,12 +56,7 @@ def critical_damping(
 
 
 def raised_damping(damping: Float, floor: tuple[float, float]) -> Float:
-    """Given damping (..., 6, 6), its symmetric translational and rotational parts raised to a floor. Couplings stay.
-
-    Args:
-        damping: (6, 6) or (N, 6, 6).
-        floor: least eigenvalue of the translational [Ns/m] and rotational [Nms/rad] part.
-    """
+    """Damping (..., 6, 6) with its translational and rotational blocks raised to a floor [Ns/m, Nms/rad]."""
     result = damping.copy()
     for part, least in ((slice(0, 3), floor[0]), (slice(3, 6), floor[1])):
         result[..., part, part] = _raise_to(damping[..., part, part], least)
@@ -87,9 +64,9 @@ def raised_damping(damping: Float, floor: tuple[float, float]) -> Float:
 
 
 def _eigen(matrix: Float) -> tuple[Float, Float]:
-    """Eigenvalues (..., n) and vectors (..., n, n). NaN for a matrix that is not finite, as of a trial that diverged.
+    """Eigenvalues (..., n) and vectors (..., n, n), NaN for a matrix that is not finite.
 
-    LAPACK would refuse such a matrix, and with it every other of the batch.
+    LAPACK would otherwise fail for the whole batch because of one diverged trial.
     """
     sound = np.asarray(np.isfinite(matrix).all(axis=(-1, -2)))
     value, vector = np.linalg.eigh(np.where(sound[..., None, None], matrix, np.eye(matrix.shape[-1])))
@@ -116,10 +93,10 @@ def _raise_to(matrix: Float, least: float) -> Float:
 
 
 def null_space_damping(jacobian: Float, mass_matrix: Float, damping: float) -> Float:
-    """Matrices (N, nv, nv) that turn joint velocities into damping torques without any effect on the task.
+    """Matrices (N, nv, nv) that turn joint velocities into damping torques without effect on the task.
 
-    With the dynamically consistent inverse Jbar = M^-1 J^T Lambda, the torque is -d N M N' q' with N = 1 - J^T Jbar^T,
-    so that J M^-1 tau = 0 (Khatib 1987); `damping` d is in 1/s. Zero for robots without redundancy.
+    With Jbar = M^-1 J^T Lambda and N = 1 - J^T Jbar^T, the torque is -d N M N' q', so that J M^-1 tau = 0 (Khatib
+    1987). `damping` d is in 1/s. The matrices are zero for robots without redundancy.
     """
     transposed = np.swapaxes(jacobian, -1, -2)
     solved = np.linalg.solve(mass_matrix, transposed)  # M^-1 J^T

@@ -1,13 +1,13 @@
-"""Safety limits that stop a trial, with the reason in words. Each is checked at every control tick.
+"""Safety limits that stop a trial, checked at every control tick.
 
-- force: norm of the filtered contact force above `force_n` (and torque above `torque_n_m`);
+- force: norm of the filtered contact force above `force_n`, or torque above `torque_n_m`;
 - motors: torque rate, effort, speed and range of the joints (`skillframe.control.motors`);
 - workspace: the tool point outside its box;
-- energy: work the controller has done on the tool at the centre of compliance since the start, above `energy_j`;
-- divergence: a state, wrench or command that is not finite, a tool faster than `SPEED_CEILING` [m/s], or a law that
-  asks for more than `WRENCH_CEILING` [N, Nm].
+- energy: work of the controller on the tool at the centre of compliance since the start, above `energy_j`;
+- divergence: a state, wrench or command that is not finite, a tool faster than `SPEED_CEILING` [m/s], or a controller
+  wrench above `WRENCH_CEILING` [N, Nm].
 
-What the simulator knows and no sensor tells, the true contact force, is `skillframe.control.contact`'s.
+`skillframe.control.contact` checks the true contact force.
 """
 
 from __future__ import annotations
@@ -19,35 +19,28 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.control.endings import Broken, Ended
 from skillframe.control.motors import Motors
 from skillframe.control.ticks import compiled
-from skillframe.frames import Float, norm
+from skillframe.frames import Float, dot, norm
 from skillframe.robot.spec import Limits
+from skillframe.skill import Broken, Ended
 
 SPEED_CEILING, WRENCH_CEILING = 20.0, 1e6
 
 
 class LimitGuard:
-    """Keeps the limits of N trials. Rows are independent of each other.
-
-    Args:
-        limits: of the robot.
-        count: N.
-        dt: [s] between two ticks.
-        motors: of the joints, where there are some.
-    """
+    """Checks the limits of N independent trials."""
 
     def __init__(self, limits: Limits, count: int, dt: float, motors: Motors | None = None) -> None:
         self._limits, self._dt, self._motors = limits, dt, motors
         self.energy = np.zeros(count)
-        """(N,) work of the controller on the tool so far [J]."""
+        """Work of the controller on the tool so far (N,) [J]."""
         self.glance = glance(limits)
         self.values: Float = np.zeros((count, len(self.glance.centre)))
-        """(N, 21) position, twist, wrench and command of the last look."""
+        """Position, twist, wrench and command (N, 21) of the last check."""
         ends = (0, 3, 9, 15, 21)
         self.parts = [self.values[:, begin:end] for begin, end in itertools.pairwise(ends)]
-        """The four of them."""
+        """Views of its four parts."""
         energy = sys.float_info.max if limits.energy_j is None else self.glance.energy
         self._look = compiled("fine", {
             "values": self.values, "energy": self.energy, "centre": self.glance.centre, "bounds": self.glance.bounds,
@@ -57,26 +50,29 @@ class LimitGuard:
     def violations(
         self, position: Float, twist: Float, wrench: Float, command: Float, rows: NDArray[np.int64]
     ) -> list[Broken]:
-        """The trials among `rows` that broke a limit.
+        """Return the trials among `rows` that broke a limit.
 
         Args:
             position: (N, 3) tool point in base.
             twist: (N, 6) of the centre of compliance.
             wrench: (N, 6) filtered, environment on tool.
-            command: (N, 6) the law's wrench on the tool at the centre of compliance.
-            rows: indices of the trials that still run.
+            command: (N, 6) the controller's wrench on the tool.
+            rows: indices of the running trials.
         """
-        self.energy += np.vecdot(command, twist) * self._dt
+        self.energy += dot(command, twist) * self._dt
         for part, given in zip(self.parts, (position, twist, wrench, command), strict=True):
             part[...] = given
         return [] if self._surely_fine(self.values) else self.named(rows)
 
     def named(self, rows: NDArray[np.int64]) -> list[Broken]:
-        """The trials among `rows` that broke a limit, by `values` and the energy that are there already."""
+        """Return the trials among `rows` that broke a limit, from the current `values` and energy."""
         values, (position, twist, wrench, command) = self.values, self.parts
         force, torque, speed = norm(wrench[:, :3]), norm(wrench[:, 3:]), norm(twist[:, :3])
         limits = self._limits
-        fine = self._inside(position) & (speed <= SPEED_CEILING)
+        fine: NDArray[np.bool_] = speed <= SPEED_CEILING
+        if limits.workspace_m is not None:
+            low, high = limits.workspace_m
+            fine &= np.all((position >= low) & (position <= high), axis=-1)
         if self._motors is not None:
             fine &= self._motors.fine()
         fine &= (force <= _or_largest(limits.force_n)) & (torque <= _or_largest(limits.torque_n_m))
@@ -89,7 +85,6 @@ class LimitGuard:
         ]
 
     def _surely_fine(self, values: Float) -> bool:
-        """Are all trials well inside all limits? One look for the many ticks in which nothing happens."""
         if self._look is not None:
             return bool(self._look()) and (self._motors is None or not self._motors.counting)
         from_centre = values - self.glance.centre
@@ -101,22 +96,14 @@ class LimitGuard:
             return False
         return bool(np.count_nonzero(sums <= self.glance.bounds) == sums.size)
 
-    def _inside(self, position: Float) -> NDArray[np.bool_]:
-        if self._limits.workspace_m is None:
-            return np.ones(len(position), dtype=bool)
-        low, high = self._limits.workspace_m
-        inside: NDArray[np.bool_] = np.all((position >= low) & (position <= high), axis=-1)
-        return inside
-
     def _broken(self, i: int, values: Float, force: float, torque: float, speed: float) -> Broken:
-        """Why trial i is not fine, the first cause in the order of the module's list."""
         limits = self._limits
         if not np.isfinite(values).all():
             return Broken(i, Ended.DIVERGED, "diverged: state or command is not a finite number")
         if speed > SPEED_CEILING:
             return Broken(i, Ended.DIVERGED, f"diverged: the tool moves at {speed:.1f} m/s")
         if norm(values[-6:]) > WRENCH_CEILING:
-            return Broken(i, Ended.DIVERGED, f"diverged: the law asks for {norm(values[-6:]):.1e} N")
+            return Broken(i, Ended.DIVERGED, f"diverged: the controller commands {norm(values[-6:]):.1e} N")
         if force > _or_largest(limits.force_n):
             return Broken(i, Ended.FORCE, f"force limit: {force:.1f} N is above {limits.force_n:g} N")
         if torque > _or_largest(limits.torque_n_m):
@@ -130,15 +117,15 @@ class LimitGuard:
 
 
 def _or_largest(limit: float | None) -> float:
-    """A limit, or the largest finite number, so that what is infinite or not a number is above every limit."""
+    """A limit, or the largest finite number, which infinity and NaN exceed."""
     return sys.float_info.max if limit is None else limit
 
 
 class Glance(NamedTuple):
-    """For position, twist, wrench, command (21,): what to subtract, which squares to sum (21, 7), bounds of the sums.
+    """A quick test of position, twist, wrench and command (21,) against sums of squares.
 
-    The bounds are below the limits by more than rounding. What is not finite makes every sum not a number. The energy
-    has a bound of its own [J].
+    `centre` is subtracted, `squares` (21, 7) selects the sums, whose `bounds` are below the limits by more than
+    rounding errors; NaN fails all of them. `energy` is the bound on energy [J].
     """
 
     centre: Float
@@ -148,7 +135,7 @@ class Glance(NamedTuple):
 
 
 def glance(limits: Limits) -> Glance:
-    """One look that tells that nothing is near its limit."""
+    """Return the quick test for some limits."""
     low, high = (np.array(corner) for corner in limits.workspace_m or ((-1e100,) * 3, (1e100,) * 3))
     centre, squares = np.zeros(21), np.zeros((21, 7))
     centre[:3] = 0.5 * (low + high)

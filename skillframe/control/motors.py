@@ -1,49 +1,62 @@
-"""What a robot's motors can give: joint torques held to their rate and to the URDF's effort, joints watched.
+r"""Motor limits: joint torques limited in effort and rate, and joints checked for speed and range.
 
-The law's torques (with gravity, which a motor has to carry as well) are held to each joint's `effort`, and then to
-`torque_rate_nm_s`. What a motor cannot do for long ends the trial, with the joint's name; the times are ours:
+Torques, gravity included, are clipped to `effort`, then to `torque_rate_nm_s`. A trial ends after
 
-- torque rate: a command that asks for more for `RATE_PERSISTENCE` ticks running (a short saturation, as at an impact,
-  is what the limiter is for);
-- effort: a law that asks for more than a joint's for `MOTOR_S` running; speed: a joint faster than its `velocity` for
-  as long; range: a joint of the arm pressed `RANGE_SLACK` into the end of its range for as long. Drives bear a peak of
-  torque or speed for a moment; a tenth of a second is ten times an impact.
+- torque rate: `RATE_PERSISTENCE` ticks in a row above the limit (an impact saturates it only briefly);
+- effort, speed: `MOTOR_S` above a joint's `effort` or `velocity`; drives can bear a short peak;
+- range: `MOTOR_S` with a joint of the arm `RANGE_SLACK` beyond its range.
 
-Zero, or nothing, in a URDF's `effort` or `velocity` means that it is not given, and no limit; `unstated` names such
-joints, so that a result can say so. A free-flying base has no motors.
+Zero or absent `effort` and `velocity` in a URDF mean no limit. The largest share of each limit is stored with its
+joint: torque over `effort`, speed over `velocity`, and distance from the middle of the range over half of it.
 
-Of each limit the largest share used so far is kept, for the joint that used most: torque asked for over `effort`, speed
-over `velocity`, and of the range the distance from its middle over half of it: 0 in the middle, 1 at an end.
+`FrictionCompensation` adds nominal friction and damping of the joints to the torques of a controller that knows them,
+
+    \(\tau_c = d \dot q + f \, \mathrm{clip}(\dot q / v_s, -1, 1)\) with \(v_s\) = 0.1 rad/s or m/s, which avoids
+    chatter at rest.
+
+Since \(|\tau_c - d \dot q| \le f\), a joint with nominal friction is never driven by it. The compensation is zero at
+rest: a joint that sticks still needs f to start.
+
+`InnerLoop` models an arm's own joint loop: delay, limited bandwidth, and a stiff servo, for each joint.
+
+    position:  q_f'' = w^2 (q_cmd - q_f) - 2 zeta w q_f'            velocity:  q_f'' = w (q'_cmd - q_f')
+    tau = M(q) [ q_f'' + 2 s (q_f' - q') + s^2 (q_f - q) ] + h(q, q')                                         (1)
+
+Commands arrive `delay_ticks` late and are held between ticks, so the filter has an exact step. M and h are the nominal
+robot's; `Motors` limits the torques. The servo's corner s sets how far the arm yields under load.
+Makers do not publish w, zeta and s: the values of `skillframe.robot.interface` are guesses to be measured on the arm.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from ctypes import c_int64
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.control.endings import Broken, Ended
 from skillframe.control.ticks import compiled
 from skillframe.frames import Float
+from skillframe.robot.interface import LOOP_DAMPING, SERVO, Admittance
 from skillframe.robot.model import RobotModel
-from skillframe.robot.numbers import numbers
-from skillframe.robot.urdf import Joint
+from skillframe.robot.urdf import Joint, numbers
+from skillframe.skill import Broken, Ended
 
-RATE_PERSISTENCE = 20  # an impact keeps the limiter busy for 5 to 10 ms; twice that is a law gone wrong
-MOTOR_S, RANGE_SLACK = 0.1, 1e-3  # s; rad or m, more than rounding and noise, less than any use
+RATE_PERSISTENCE = 20  # an impact saturates the limiter for 5 to 10 ms
+MOTOR_S, RANGE_SLACK = 0.1, 1e-3  # s, ten times an impact; rad or m, more than rounding and noise
 
 
 class JointLimits(NamedTuple):
-    """Limits of the generalised velocities of one batch row, in the simulator's order. Infinite where none is given.
+    """Limits of one batch row, in the simulator's order of generalised velocities. Infinite where none is given.
 
     Attributes:
         names: (nv) of the joints.
         sliding: (nv) prismatic joints.
-        effort: (nv,) [N m or N]; velocity: (nv,) [rad/s or m/s].
+        effort: (nv,) [N m or N].
+        velocity: (nv,) [rad/s or m/s].
         lower, upper: (nv,) [rad or m].
-        ranged: (nv,) 1 where the URDF gives the range, 0 where lower and upper are ours or there are none.
+        ranged: (nv,) 1 where the URDF gives the range, else 0.
     """
 
     names: tuple[str, ...]
@@ -56,14 +69,10 @@ class JointLimits(NamedTuple):
 
 
 def joint_limits(robot: RobotModel, engine: Any, arms: Sequence[NDArray[np.int64]] | None = None) -> list[JointLimits]:
-    """What the URDF says of a robot's joints, for each arm, or for the whole robot. Empty if it has no joints.
+    """URDF limits of the joints of each arm, or of the whole robot. Empty if it has no joints.
 
-    Of a joint that no tool frame is carried by, as a gripper's that is closed, the range is not watched.
-
-    Args:
-        robot: with its URDF.
-        engine: the simulator's model, which orders the generalised velocities.
-        arms: of each arm its generalised velocities.
+    `engine` orders the generalised velocities, `arms` lists those of each arm. Ranges of joints that carry no tool
+    frame, such as a closed gripper's, are ignored.
     """
     model, nv = robot.model, int(engine.nv)
     names, sliding = [""] * nv, [False] * nv
@@ -92,7 +101,7 @@ def joint_limits(robot: RobotModel, engine: Any, arms: Sequence[NDArray[np.int64
 
 
 class _Given(NamedTuple):
-    """What a URDF says of a joint: effort and velocity, infinite where not given, and whether it gives a range."""
+    """URDF limits of a joint: effort and velocity, infinite where absent, and whether it has a range."""
 
     effort: float
     velocity: float
@@ -108,7 +117,7 @@ def _given(joint: Joint) -> _Given:
 
 
 def unstated(robot: RobotModel) -> list[str]:
-    """Sentences on joints whose effort, velocity or range the URDF does not give. None if it gives them all."""
+    """Return sentences on joints without effort, velocity or range in the URDF."""
     model = robot.model
     moving = [robot.urdf.joints.get(model.names[i]) for i in range(1, model.njoints) if model.joints[i].nv == 1]
     given = {joint.name: (_given(joint), joint.type) for joint in moving if joint is not None}
@@ -118,22 +127,12 @@ def unstated(robot: RobotModel) -> list[str]:
         (motors, "the URDF gives no effort or no velocity for {}; what it does not give counts as unlimited"),
         (ranges, "the URDF gives no range for {}; it counts as free within +-2 pi rad or +-10 m"),
     )
-    return [text.format(_few(names)) for names, text in said if names]
-
-
-def _few(names: list[str]) -> str:
-    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+    few = [", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "") for names, _ in said]
+    return [text.format(named) for named, (names, text) in zip(few, said, strict=True) if names]
 
 
 class Motors:
-    """The motors of N rows. Rows are independent of each other.
-
-    Args:
-        limits: of each row's joints: one for all, or one per arm, which rows take in turn.
-        rate: [N m/s] of joint torques, or None.
-        count: N.
-        dt: [s] between two ticks.
-    """
+    """The motors of N independent rows, which take `limits` in turn. `rate` is of joint torques [N m/s]."""
 
     def __init__(self, limits: Sequence[JointLimits], rate: float | None, count: int, dt: float) -> None:
         self._limits, self._rate, self._dt = limits, rate, dt
@@ -158,74 +157,61 @@ class Motors:
         whole = {"now": self._now, "peak": self._peak, "last": self._last, "middle": self._middle, "most": self._most}
         self._above = compiled("held", {**whole, "count": count, "nv": nv}) or self._above_in_numpy
         self.counting = False
-        """Is any row beyond what a motor can give?"""
+        """Whether any row currently exceeds a limit."""
 
     def held(self, torque: Float, velocity: Float, position: Float) -> Float:
-        """Joint torques (N, nv) as the motors give them.
-
-        Args:
-            torque: (N, nv) that the law asks for.
-            velocity: (N, nv) of the joints.
-            position: (N, nv) of the joints.
-        """
+        """Joint torques (N, nv) that the motors deliver for commanded torques and the joints' state."""
         if not self._begun:
             self._last[:], self._begun = torque, True
         self._asked[:] = torque
         self._speed[:] = velocity
         self._place[:] = position
         if self._above():
-            torque = self._limited(torque, self._last, np.abs(self._now) > self._most)
+            over = np.abs(self._now) > self._most
+            nv = torque.shape[1]
+            torque = np.minimum(np.maximum(torque, -self._effort), self._effort)  # else it would count as too fast
+            change = torque - self._last
+            fast = np.abs(change) > self._most[:, :nv]
+            self._ticks += 1
+            self._ticks *= over[:, nv:]
+            self._rate_ticks = (self._rate_ticks + 1) * fast.any(-1)
+            self.counting = True
+            if self._rate is not None:
+                torque = np.where(fast, self._last + np.copysign(self._rate * self._dt, change), torque)
         elif self.counting:
             self._ticks[:], self._rate_ticks[:], self.counting = 0, 0, False
         self._last[:] = torque
         return torque
 
     def _above_in_numpy(self) -> int:
-        """Take in what is asked and done. How many numbers are above what a motor can give."""
         np.subtract(self._asked, self._last, out=self._change)
         np.subtract(self._place, self._middle, out=self._place)
         size = np.abs(self._now)
         np.maximum(self._peak, size, out=self._peak)
         return int(np.count_nonzero(size > self._most))
 
-    def _limited(self, torque: Float, last: Float, over: NDArray[np.bool_]) -> Float:
-        """Held to the effort, and then to the rate: a motor at its effort is not asked for a rate besides."""
-        nv = torque.shape[1]
-        torque = np.minimum(np.maximum(torque, -self._effort), self._effort)
-        change = torque - last
-        fast = np.abs(change) > self._most[:, :nv]
-        self._ticks += 1
-        self._ticks *= over[:, nv:]
-        self._rate_ticks = (self._rate_ticks + 1) * fast.any(-1)
-        self.counting = True
-        if self._rate is None:
-            return torque
-        return np.where(fast, last + np.copysign(self._rate * self._dt, change), torque)
-
     def fine(self) -> NDArray[np.bool_]:
-        """(N,) no row beyond for too long."""
+        """Rows (N,) that exceed no limit for too long."""
         lasting: NDArray[np.bool_] = self._rate_ticks < RATE_PERSISTENCE
         lasting &= (self._ticks < self._persistence).all(-1)
         return lasting
 
     def broken(self, i: int) -> Broken | None:
-        """Why row i is not fine."""
+        """The limit that row i broke."""
         if self._rate_ticks[i] >= RATE_PERSISTENCE:
             text = f"torque rate limit: above {self._rate:g} Nm/s for {RATE_PERSISTENCE} ticks"
             return Broken(i, Ended.TORQUE_RATE, text)
         nv = self._effort.shape[1]
         late = np.flatnonzero(self._ticks[i] >= self._persistence)
-        return None if not len(late) else self._lasting(i, *divmod(int(late[0]), nv))
-
-    def _lasting(self, i: int, kind: int, joint: int) -> Broken:
-        """What joint `joint` of row i has asked, or done, for too long: 0 torque, 1 speed, 2 range."""
-        limits = self._limits[i % len(self._limits)]
+        if not len(late):
+            return None
+        kind, joint = divmod(int(late[0]), nv)
+        limits, spell = self._limits[i % len(self._limits)], f"for {1e3 * MOTOR_S:.0f} ms"
         name, sliding = limits.names[joint], limits.sliding[joint]
-        nv, spell = len(limits.names), f"for {1e3 * MOTOR_S:.0f} ms"
         value, most = abs(self._now[i, (kind + 1) * nv + joint]), self._most[i, (kind + 1) * nv + joint]
         if kind == 0:
             unit = "N" if sliding else "Nm"
-            text = f"motor limit: {name} at its {most:g} {unit} {spell}, the law asks for {value:.3g} {unit}"
+            text = f"motor limit: {name} at its {most:g} {unit} {spell}, the controller commands {value:.3g} {unit}"
             return Broken(i, Ended.MOTOR, text)
         unit = "m" if sliding else "rad"
         if kind == 1:
@@ -237,8 +223,7 @@ class Motors:
     def shares(self) -> tuple[Float, NDArray[np.object_]]:
         """Largest shares so far of torque, speed and range (3, N), and the joints' names (3, N).
 
-        NaN and "" where no limit is given. The torque is what the law asks for, so that a share above 1 tells how much
-        a motor was short of.
+        NaN and "" where no limit is given. Torque is the commanded one, so a share above 1 shows what the motor lacked.
         """
         rows, _, nv = self._whole.shape
         share = self._peak[:, nv:].reshape(rows, 3, nv) / self._whole
@@ -247,5 +232,102 @@ class Motors:
         most = np.take_along_axis(share, worst[..., None], axis=-1)[..., 0]
         names = np.array([one.names for one in self._limits], dtype=object)
         joints = names[(np.arange(rows) % len(names))[:, None], worst]
-        known = most >= 0.0  # nor of a trial that diverged
+        known = most >= 0.0  # false for a diverged trial too
         return np.where(known, most, np.nan).T, np.where(known, joints, "").T
+
+
+SLOW = 0.1  # rad/s or m/s
+
+
+class FrictionCompensation:
+    """Friction compensation of N rows, each with the joints of one arm.
+
+    `arms` lists the generalised velocities of each arm, which rows take in turn; None if rows have all of them.
+    """
+
+    def __init__(self, engine: Any, arms: Sequence[NDArray[np.int64]] | None, count: int) -> None:
+        chosen = [np.arange(int(engine.nv))] if arms is None else arms
+        turns = count // len(chosen)
+        self._friction, self._damping = (
+            np.tile(np.stack([np.array(values, dtype=float)[dofs] for dofs in chosen]), (turns, 1))
+            for values in (engine.dof_frictionloss, engine.dof_damping)
+        )
+
+    def torque(self, velocity: Float) -> Float:
+        """Torques (N, nv) to add at joint velocities (N, nv)."""
+        along = np.minimum(np.maximum(velocity * (1.0 / SLOW), -1.0), 1.0)
+        result: Float = self._damping * velocity + self._friction * along
+        return result
+
+
+LATE, STIFF = 2.0 * SERVO, SERVO**2
+"""2 s and s^2 of (1)."""
+
+
+class InnerLoop:
+    """The loops of N independent arms with n joints each, at rest at `start` (N, n).
+
+    `mass_matrix` returns (N, n, n) of the nominal robots.
+    """
+
+    def __init__(self, arm: Admittance, start: Float, mass_matrix: Callable[[], Float], dt: float) -> None:
+        self._of_position = arm.kind == "position"
+        w, self._mass_matrix = arm.bandwidth, mass_matrix
+        # coefficients of (1): q_f'' combined with the servo's term in q_f'
+        self._back, self._fade = (-w * w, LATE - 2.0 * LOOP_DAMPING * w) if self._of_position else (w, LATE - w)
+        self._place, self._speed = start.copy(), np.zeros_like(start)
+        still = start if self._of_position else self._speed
+        self._line = np.tile(still, (arm.delay_ticks + 1, 1, 1))
+        self._position, self._velocity = np.zeros((2, *start.shape))
+        self._asked, self._torque = np.zeros((2, *start.shape, 1))
+        self._tick = 0
+        self._step = _exact_step(arm, dt)
+        (a, b, u), (c, d, v) = self._step
+        self._ask = compiled("inner", {
+            "line": self._line, "position": self._position, "velocity": self._velocity, "place": self._place,
+            "speed": self._speed, "asked": self._asked, "back": self._back, "fade": self._fade, "late": LATE,
+            "stiff": STIFF, "a": a, "b": b, "u": u, "c": c, "d": d, "v": v, "of_position": int(self._of_position),
+            "numbers": self._place.size,
+        }, c_int64) or self._ask_in_numpy  # fmt: skip
+
+    def torque(self, command: Float, position: Float, velocity: Float, bias: Float) -> Float:
+        """Joint torques (N, n) for a command (N, n) of joint positions or velocities sent now.
+
+        `bias` (N, n) are gravity, Coriolis and centrifugal torques of the nominal robots.
+        """
+        length = len(self._line)
+        self._line[self._tick % length] = command
+        if self._tick % 20 == 0:  # an arm hardly turns in 20 ms
+            self._mass = self._mass_matrix()
+        self._tick += 1
+        self._position[:], self._velocity[:] = position, velocity
+        self._ask(self._tick % length)  # the oldest: sent `delay_ticks` ago
+        np.matmul(self._mass, self._asked, out=self._torque)
+        torque: Float = self._torque[..., 0] + bias
+        return torque
+
+    def _ask_in_numpy(self, heard_at: int) -> int:
+        heard, speed = self._line[heard_at], self._speed
+        off = self._place - heard
+        rate = self._back * (off if self._of_position else heard) + self._fade * speed
+        self._asked[..., 0] = rate - LATE * self._velocity + STIFF * (self._place - self._position)
+        (a, b, u), (c, d, v) = self._step
+        if self._of_position:
+            self._place[:], self._speed[:] = heard + a * off + b * speed, c * off + d * speed
+        else:
+            self._place[:], self._speed[:] = self._place + b * speed + u * heard, d * speed + v * heard
+        return 0
+
+
+def _exact_step(arm: Admittance, dt: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+    """Rows (place, speed, command) of the filter's exact step for place and speed, with a position command of 0."""
+    w = arm.bandwidth
+    if arm.kind == "velocity":
+        fade = float(np.exp(-w * dt))
+        return (1.0, (1.0 - fade) / w, dt - (1.0 - fade) / w), (0.0, fade, 1.0 - fade)
+    real, turn = LOOP_DAMPING * w, w * float(np.sqrt(1.0 - LOOP_DAMPING**2))
+    fade, cosine, sine = float(np.exp(-real * dt)), float(np.cos(turn * dt)), float(np.sin(turn * dt)) / turn
+    return (
+        (fade * (cosine + real * sine), fade * sine, 0.0),
+        (-fade * w * w * sine, fade * (cosine - real * sine), 0.0),
+    )

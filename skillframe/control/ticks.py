@@ -1,7 +1,6 @@
-"""What motors, limits, inner loop and admittance law do number by number, in C: a third of the time, the same bits.
+"""Compiled loops (ticks.c) of motors, limits, inner loop and admittance: same bits as numpy, in a third of the time.
 
-What is done is in ticks.c; it is called by the classes whose arrays it works on. Without a compiler each of them does
-the same in numpy.
+The classes that own the arrays call it. Without a compiler each does the same in numpy.
 """
 
 from __future__ import annotations
@@ -14,9 +13,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.fmu.native import Record, library
+from skillframe.fmu.build import Record, library
 from skillframe.frames import Float, Pose
-from skillframe.signals.kalman import SteadyWrenchFilter
+from skillframe.signals import SteadyWrenchFilter
 from skillframe.skill import Command
 
 SOURCE = Path(__file__).with_name("ticks.c")
@@ -24,19 +23,16 @@ Fields = Mapping[str, NDArray[Any] | int | float]
 
 
 def compiled(name: str, fields: Fields, *more: type) -> Callable[..., int] | None:
-    """A function of ticks.c over some arrays, or None without a compiler.
+    """Return a function of ticks.c bound to `fields`, in the order of its struct, or None without a compiler.
 
-    Args:
-        name: of it.
-        fields: of its record, in the order of its struct.
-        more: numbers that it is given at each call.
+    `more` are the types of further arguments.
     """
     built = library(SOURCE)
     return None if built is None else Record(fields).bound(built, name, *more)
 
 
 class LawSettings(NamedTuple):
-    """Of `CompiledAdmittance`: h [s], the push (force, torque), and squares of force and torque that are not felt."""
+    """Settings of `CompiledAdmittance`: h [s], push (force, torque), squares of the contact thresholds."""
 
     step: float
     push: tuple[float, float]
@@ -44,16 +40,11 @@ class LawSettings(NamedTuple):
 
 
 class _Apart:
-    """Desired less measured poses of N trials, as `skillframe.control.impedance.pose_error`.
-
-    Args:
-        count: N.
-        built: ticks.c.
-    """
+    """Pose errors of N trials, as `skillframe.frames.pose_error`."""
 
     def __init__(self, count: int, built: ctypes.CDLL) -> None:
         self.error: Float = np.zeros((count, 6, 1))
-        """(N, 6, 1) metres, then rotation vectors."""
+        """Positions [m], then rotation vectors (N, 6, 1)."""
         self._turn, (self._desired, self._at, self._axis) = np.zeros((count, 3, 3)), np.zeros((3, count, 3))
         self._sine, self._cosine, self._angle = np.zeros((3, count))
         record = Record({
@@ -63,23 +54,18 @@ class _Apart:
         self._turned, self._apart = record.bound(built, "turned"), record.bound(built, "apart")
 
     def found(self, desired: Pose, measured: Pose) -> bool:
-        """Find the error. False where a turn is near pi and it is not found."""
+        """Compute the error. Returns False if a rotation is near pi, where numpy has to do it."""
         self._desired[:], self._at[:] = desired.position, measured.position
         np.matmul(desired.rotation, measured.rotation.mT, out=self._turn)
         self._turned()
-        np.vecdot(self._axis, self._axis, out=self._sine)
+        np.add.reduce(self._axis * self._axis, axis=-1, out=self._sine)
         np.sqrt(self._sine, out=self._sine)
         np.arctan2(self._sine, self._cosine, out=self._angle)
         return not self._apart()
 
 
 class CompiledImpedance:
-    """Wrenches of N trials by equation (1) of `skillframe.control.impedance`.
-
-    Args:
-        count: N.
-        built: ticks.c.
-    """
+    """Wrenches of N trials by equation (1) of `skillframe.control.controller`."""
 
     def __init__(self, count: int, built: ctypes.CDLL) -> None:
         self._apart = _Apart(count, built)
@@ -92,15 +78,7 @@ class CompiledImpedance:
         self._find_off, self._find_law = (record.bound(built, name, ctypes.c_double) for name in ("off", "sprung"))
 
     def wrench(self, command: Command, pose: Pose, twist: Float, damping: Float, ramp: float) -> Float | None:
-        """Wrenches (N, 6), an array of their own. None where a turn is near pi.
-
-        Args:
-            command: what the skill wants.
-            pose: measured.
-            twist: measured.
-            damping: (6, 6) or (N, 6, 6).
-            ramp: of desired twist and feed-forward.
-        """
+        """Wrenches (N, 6) as a new array, or None where a rotation is near pi."""
         if not self._apart.found(command.pose, pose):
             return None
         self._wanted[:], self._twist[:], self._forward[:] = command.twist, twist, command.feedforward
@@ -112,23 +90,17 @@ class CompiledImpedance:
 
 
 def compiled_impedance(count: int) -> CompiledImpedance | None:
-    """A `CompiledImpedance`, or None without a compiler."""
+    """Return a `CompiledImpedance`, or None without a compiler."""
     built = library(SOURCE)
     return None if built is None else CompiledImpedance(count, built)
 
 
 class CompiledAdmittance:
-    """Drive and force of an admittance law of N trials: equation (2) of `skillframe.control.admittance` up to its gain.
-
-    Args:
-        count: N.
-        settings: of the law.
-        built: ticks.c.
-    """
+    """Drive and force of N trials by equation (2) of `skillframe.control.admittance`, without its gain."""
 
     def __init__(self, count: int, settings: LawSettings, built: ctypes.CDLL) -> None:
         self.drive, self.force = np.zeros((2, count, 6))
-        """(N, 6) drive, held to the push, and with damping and what is felt."""
+        """Limited drive (N, 6), and its sum with damping and contact wrench."""
         self._apart = _Apart(count, built)
         self._twist, self._forward, self._wrench = np.zeros((3, count, 6))
         self._wanted, self._spring, self._braked = np.zeros((3, count, 6, 1))
@@ -144,7 +116,7 @@ class CompiledAdmittance:
         self._driven = record.bound(built, "driven", ctypes.c_double)
 
     def strayed(self, desired: Pose, pose: Pose, twist: Float) -> bool:
-        """Find the error that a step on at a twist (N, 6) leaves. False where a turn is near pi and it is not found."""
+        """Compute the error left after a step at a twist (N, 6). Returns False if a rotation is near pi."""
         if not self._apart.found(desired, pose):
             return False
         self._twist[:] = twist
@@ -152,14 +124,7 @@ class CompiledAdmittance:
         return True
 
     def find(self, command: Command, wrench: Float, ramp: float, gains: tuple[Float, Float, Float]) -> None:
-        """Find drive and force, after the error.
-
-        Args:
-            command: what the skill wants.
-            wrench: (N, 6) of the environment.
-            ramp: of desired twist and feed-forward.
-            gains: stiffness, damping against the desired twist, damping of the twist, each (6, 6) or (N, 6, 6).
-        """
+        """Compute drive and force, with stiffness and damping of the desired and of the actual twist as `gains`."""
         stiffness, wanted, damping = gains
         self._forward[:], self._wrench[:] = command.feedforward, wrench
         np.matmul(wanted, command.twist[..., None], out=self._wanted)
@@ -167,25 +132,19 @@ class CompiledAdmittance:
         np.matmul(damping, self._twist[..., None], out=self._braked)
         self._driven(ramp)
         drive, felt = self._halves
-        np.vecdot(drive, drive, out=self._squares)
-        np.vecdot(felt, felt, out=self._felt)
+        np.add.reduce(drive * drive, axis=-1, out=self._squares)
+        np.add.reduce(felt * felt, axis=-1, out=self._felt)
         self._pushed()
 
 
 def compiled_admittance(count: int, settings: LawSettings) -> CompiledAdmittance | None:
-    """A `CompiledAdmittance`, or None without a compiler."""
+    """Return a `CompiledAdmittance`, or None without a compiler."""
     built = library(SOURCE)
     return None if built is None else CompiledAdmittance(count, settings, built)
 
 
 class CompiledSteps:
-    """Joint velocities of N arms with n joints, where none is at a limit: `skillframe.control.joint_steps`.
-
-    Args:
-        home: (N, n) posture; limits: velocity, lower, upper and leash, (n,) each.
-        posture: k [1/s]; step: h [s].
-        built: ticks.c.
-    """
+    """Joint velocities of N arms with n joints away from their limits (`skillframe.control.joint_steps`)."""
 
     def __init__(
         self, home: Float, limits: tuple[Float, Float, Float, Float], posture: float, step: float, built: ctypes.CDLL
@@ -207,7 +166,7 @@ class CompiledSteps:
     def speed(
         self, twist: Float, jacobian: Float, inverse: Float, command: Float, measured: Float
     ) -> Float | None:  # fmt: skip
-        """Joint velocities (N, n), an array of their own. None where a joint may be at a limit."""
+        """Joint velocities (N, n) as a new array, or None where a joint may be at a limit."""
         self._twist[:], self._command[:], self._measured[:] = twist, command, measured
         self._back()
         np.matmul(jacobian, self._spare, out=self._made)
@@ -219,19 +178,13 @@ class CompiledSteps:
 def compiled_steps(
     home: Float, limits: tuple[Float, Float, Float, Float], posture: float, step: float
 ) -> CompiledSteps | None:  # fmt: skip
-    """`CompiledSteps`, or None without a compiler."""
+    """Return a `CompiledSteps`, or None without a compiler."""
     built = library(SOURCE)
     return None if built is None else CompiledSteps(home, limits, posture, step, built)
 
 
 class CompiledFilter:
-    """The converged wrench filter (`skillframe.signals.kalman`) of N rows, and what it says taken at another point.
-
-    Args:
-        count: N.
-        filter_: whose gain and time step it has.
-        built: ticks.c.
-    """
+    """The converged wrench filter (`skillframe.signals`) of N rows, with its result moved to another point."""
 
     def __init__(self, count: int, filter_: SteadyWrenchFilter, built: ctypes.CDLL) -> None:
         self._measured, self._value, self._slope, self._moved = np.zeros((4, count, 6))
@@ -243,17 +196,17 @@ class CompiledFilter:
         }).bound(built, "filtered")  # fmt: skip
 
     def start(self, wrench: Float) -> None:
-        """Begin at a measured wrench (N, 6) with no slope."""
+        """Start at a measured wrench (N, 6) with zero slope."""
         self._value[:], self._slope[:] = wrench, 0.0
 
     def step(self, wrench: Float, lever: Float) -> Float:
-        """Take in a measurement (N, 6). The filtered wrench (N, 6) at a point `lever` (N, 3) away, an own array."""
+        """Filter a measurement (N, 6). Returns the wrench (N, 6) at a point `lever` (N, 3) away, as a new array."""
         self._measured[:], self._lever[:] = wrench, lever
         self._filtered()
         return self._moved.copy()
 
 
 def compiled_filter(count: int, filter_: SteadyWrenchFilter | None) -> CompiledFilter | None:
-    """A `CompiledFilter`, or None where nothing is filtered or without a compiler."""
+    """Return a `CompiledFilter`, or None without a filter or a compiler."""
     built = None if filter_ is None else library(SOURCE)
     return None if built is None or filter_ is None else CompiledFilter(count, filter_, built)

@@ -1,13 +1,8 @@
-"""Co-simulation of mechanics and actuators over power bonds. It needs no robot.
+"""Co-simulation of mechanics and actuators over power bonds, without a robot."""
 
-`Master` couples `Mechanics` (forces in, motion out) with a bank of actuators (motion in, forces out),
-`coupling_numbers` and `require_stable` say beforehand whether a step is small enough.
-"""
-
-from skillframe.cosim.bond import bond_work, relative_residual
 from skillframe.cosim.coupling import Coupling, coupling_numbers, require_stable
+from skillframe.cosim.energy_balance import Mechanics, Motion, bond_work, relative_residual
 from skillframe.cosim.master import CosimSettings, Master
-from skillframe.cosim.plant import Mechanics, Motion
 
 __all__ = [
     "CosimSettings",

@@ -1,9 +1,8 @@
-r"""Is the step small enough for the load? Two numbers per bond, measured on the actuators themselves.
+r"""Stability of the coupling step, from two numbers per bond measured on the actuators.
 
-Holding an actuator's force over a step H makes the bond a sampled spring and damper: \(\omega_h H\) with
-\(\omega_h = \sqrt{k/m}\), and \(c H / m\), where k is the force per displacement over one step, c the force per
-velocity at once (direct feedthrough, such as friction), and m the mass the bond feels. Warn above 0.3 and refuse above
-1.0: our choice, because in trials the master was stable up to about 1.5 in either and diverged at 2.
+A force held over a step H makes the bond a sampled spring and damper: \(\omega_h H\) with \(\omega_h = \sqrt{k/m}\),
+and \(c H / m\), where k is force per displacement over a step, c force per velocity at once, and m the mass at the
+bond.
 """
 
 from __future__ import annotations
@@ -13,20 +12,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.cosim.plant import Float
+from skillframe.cosim.energy_balance import Float
 from skillframe.errors import SkillframeError
 from skillframe.fmu.actuator import Actuators
 
-WARN, REFUSE = 0.3, 1.0
-SPEED = 1e-3  # m/s, of the trial motion
+WARN, REFUSE = 0.3, 1.0  # tests diverge at 2
+SPEED = 1e-3  # test speed [m/s]
 
 
 class StepTooLarge(SkillframeError):
-    """The step cannot be stable with this load. The sentence has the numbers and the step that would do."""
+    """The step is unstable with this load. The message names a stable one."""
 
 
 class Coupling(NamedTuple):
-    """Numbers of every bond, (count,) each.
+    """Coupling numbers of every bond, (count,) each.
 
     Attributes:
         stiffness: force per displacement over a step [N/m]; feedthrough: force per velocity at once [N s/m].
@@ -47,16 +46,10 @@ class Coupling(NamedTuple):
 
 
 def coupling_numbers(bank: Actuators, mass: Float, step: float, time: float = 0.0) -> Coupling:
-    """Try the actuators out at their present inputs with a slow push and pull. They are back afterwards.
-
-    Args:
-        bank: started; position inputs at the pose to be judged.
-        mass: (count,) that each bond feels [kg].
-        step: macro step [s].
-        time: present time [s].
+    """Measure coupling numbers for masses (count,) [kg] at the bonds and a step [s]. States are restored.
 
     Raises:
-        SkillframeError: an actuator cannot be set back, or refuses the trial.
+        SkillframeError: an actuator cannot be restored, or fails.
     """
     kept, velocity = bank.u.copy(), bank.inputs.index("velocity")
     forward, back = (_pushed(bank, sign * SPEED, step, time, kept, velocity) for sign in (1.0, -1.0))
@@ -69,7 +62,7 @@ def coupling_numbers(bank: Actuators, mass: Float, step: float, time: float = 0.
 
 
 def _pushed(bank: Actuators, speed: float, step: float, time: float, kept: Float, velocity: int) -> tuple[Float, Float]:
-    """(force after moving for a step and stopping, force at once at that speed)."""
+    """Force after moving for a step and stopping, and force at once at that speed."""
     force = bank.outputs.index("force")
     if not all(bank.capabilities(i).rollback for i in range(bank.count)):
         raise SkillframeError("the coupling cannot be tried out: an actuator's state cannot be restored")
@@ -94,10 +87,10 @@ def _pushed(bank: Actuators, speed: float, step: float, time: float, kept: Float
 def require_stable(
     coupling: Coupling, step: float, names: Sequence[str], warn: Callable[[str], None] = lambda text: None
 ) -> None:
-    """Refuse a step that cannot be stable. Warn about one that will be inaccurate.
+    """Refuse an unstable step and warn about an inaccurate one.
 
     Raises:
-        StepTooLarge: with the bond, its numbers, and a step that would do.
+        StepTooLarge: with the bond, its numbers, and a stable step.
     """
     for i, worst in enumerate(coupling.worst):
         if worst <= WARN:

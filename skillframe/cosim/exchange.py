@@ -1,8 +1,6 @@
-"""A macro step of the master in C, where plant and bank keep their numbers in arrays that C can reach.
+"""Macro step of the master in C (exchange.c), for plants and banks with accessible arrays.
 
-It is `Master._exchange` for the common case, number by number: an acceleration is taken, work is given, outputs follow
-inputs, nothing is stepped in parts. Half of the master's time went into numpy calls on three numbers each. What it does
-is in exchange.c, built once. Without a compiler, or for plants and banks of other kinds, the master's own code runs.
+It equals `Master._exchange` for actuators with acceleration, work and refresh, without substeps.
 """
 
 from __future__ import annotations
@@ -16,21 +14,20 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.cosim.bond import BondLedger
-from skillframe.cosim.plant import Float
+from skillframe.cosim.energy_balance import BondLedger, Float
 from skillframe.fmu.actuator import DISCARD, Actuators
 from skillframe.fmu.build import build_source
 
 
 class PlantArrays(NamedTuple):
-    """Where a plant of N trials with k driven joints keeps its numbers, all of them live.
+    """Arrays of a plant of N trials with k driven joints.
 
     Attributes:
-        position, velocity, acceleration: (N, ...) with contiguous rows; load: (N, nv) forces besides the bonds'.
-        applied: (N, nv) generalised forces, which are written; still: those of them that stay zero.
-        places, dofs: (k,) columns of the driven joints in positions, and in velocities, accelerations and forces.
+        position, velocity, acceleration: (N, ...) with contiguous rows; load: (N, nv) other forces.
+        applied: (N, nv) written forces; still: columns that stay zero.
+        places, dofs: (k,) columns of driven joints in positions, and in the other arrays.
         step: [s] of `advance`.
-        accelerate: brings accelerations up to date with what is applied; advance: lets a step pass under it.
+        accelerate: updates accelerations; advance: does a step.
     """
 
     position: Float
@@ -47,7 +44,7 @@ class PlantArrays(NamedTuple):
 
 
 class _Exchange(ctypes.Structure):
-    """As in exchange.c."""
+    """Struct of exchange.c."""
 
     _fields_ = [
         *((name, ctypes.c_void_p) for name in (
@@ -62,7 +59,6 @@ class _Exchange(ctypes.Structure):
 
 @lru_cache(maxsize=1)
 def _library() -> ctypes.CDLL | None:
-    """The built exchange, or None where there is no compiler."""
     path = build_source(Path(__file__).with_name("exchange.c"))
     if path is None:
         return None
@@ -76,14 +72,7 @@ def _library() -> ctypes.CDLL | None:
 
 
 class CompiledExchange:
-    """One macro step of a plant and a bank.
-
-    Args:
-        plant: its arrays.
-        bank: an `FmuBank` that is stepped by C.
-        ledger: of the bonds; force: (count,) on them, which is read and written.
-        library: as built.
-    """
+    """Macro step of a plant, an `FmuBank` with a C step, and the forces (count,) on their bonds."""
 
     def __init__(
         self, plant: PlantArrays, bank: Any, ledger: BondLedger, force: Float, library: ctypes.CDLL
@@ -110,7 +99,7 @@ class CompiledExchange:
         self._told, self._at = told, ctypes.c_void_p(ctypes.addressof(told))
 
     def step(self, time: float, step: float) -> bool:
-        """From `time` on for `step` [s]. Returns False if an actuator has failed."""
+        """Step from `time` by `step` [s]. Returns False if an actuator failed."""
         at, library, plant, row = self._at, self._library, self._plant, self._ledger.claim()
         library.push(at)
         plant.accelerate()
@@ -129,7 +118,7 @@ class CompiledExchange:
 def compiled_exchange(
     plant: Any, bank: Actuators, ledger: BondLedger, force: Float, step: float
 ) -> CompiledExchange | None:  # fmt: skip
-    """A `CompiledExchange`, or None where plant or bank are of another kind, or there is no compiler."""
+    """A `CompiledExchange`, or None if plant, bank or compiler do not allow it."""
     arrays: PlantArrays | None = plant.arrays() if hasattr(plant, "arrays") else None
     if arrays is None or getattr(bank, "native", None) is None or abs(arrays.step - step) > 1e-12:
         return None

@@ -1,16 +1,11 @@
-r"""The master: Gauss-Seidel, actuators first, then the mechanics under the force that goes linearly to the new one.
+r"""Gauss-Seidel master: first the actuators, then the mechanics under a force linear to the new one.
 
-One macro step H, with the force F_k of the last one:
-
+A macro step H with the last force F_k, of second order in H:
 1. the plant's motion x, v, a under F_k;
-2. every actuator steps with x, v and a (it follows x + v s + a s^2/2 inside) and gives F_{k+1} and its work;
+2. every actuator steps along x + v s + a s^2/2 and gives F_{k+1} and its work;
 3. the plant advances under the force from F_k to F_{k+1};
-4. actuators whose outputs follow their inputs are shown the true x and v, which corrects F_{k+1} (friction).
-
-Of second order in H. An actuator that takes no acceleration is stepped in `plain_substeps` parts at the mean velocity
-of each, which costs accuracy and some of the order (1.6 measured). The energy that the plant received and the actuator
-gave are compared bond by bond. The order and the quantities are our choice, from a comparison of a dozen variants;
-energy as error measure after Sadjina et al., Engineering with Computers 33, 2017.
+4. actuators whose outputs follow inputs get the true x and v, which corrects F_{k+1} (friction).
+Actuators without acceleration input take `plain_substeps` at mean velocities.
 """
 
 from __future__ import annotations
@@ -22,25 +17,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.cosim.bond import BondLedger, bond_work, relative_residual
-from skillframe.cosim.exchange import CompiledExchange, compiled_exchange
-from skillframe.cosim.plant import Float, Mechanics, Motion
+from skillframe.cosim.energy_balance import BondLedger, Float, Mechanics, Motion, bond_work, relative_residual
+from skillframe.cosim.exchange import compiled_exchange
 from skillframe.errors import SkillframeError
 from skillframe.fmu.actuator import Actuators
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CosimSettings:
-    """How to step.
+    """Settings of the master.
 
     Attributes:
         step: macro step H [s].
-        plant_substeps: parts in which the plant advances over H, under the interpolated force.
-        actuator_substeps: parts in which actuators step over H, along the same parabola.
+        plant_substeps: steps of the plant in H, under the interpolated force.
+        actuator_substeps: steps of actuators in H, along the same parabola.
         plain_substeps: the same for actuators that take no acceleration.
         tolerance_j: halve a step whose bond error exceeds this energy [J]; None keeps H. One trial at a time.
-        least_step: below it, a step that still fails ends the trial [s].
-        residual_limit: relative bond residual above which `trouble` says so.
+        least_step: below it, a failing step ends the trial [s].
+        residual_limit: relative bond residual that `trouble` reports.
     """
 
     step: float = 1e-3
@@ -55,15 +49,11 @@ class CosimSettings:
 class Master:
     """Couples a plant and a bank of actuators.
 
-    Args:
-        plant, bank: with the same number of bonds.
-        settings: see `CosimSettings`.
-
     Attributes:
-        time: now [s]; force: (count,) on the bonds now [N]; steps: internal macro steps taken.
+        time: now [s]; force: (count,) on the bonds [N]; steps: macro steps taken.
 
     Raises:
-        SkillframeError: bonds do not match, or halving is asked for and cannot be done.
+        SkillframeError: bonds do not match, or halving is impossible.
     """
 
     def __init__(self, plant: Mechanics, bank: Actuators, settings: CosimSettings | None = None) -> None:
@@ -88,19 +78,16 @@ class Master:
         self.time, self.steps = 0.0, 0
         self.force = np.zeros(bank.count)
         self._ledger = BondLedger(bank.count)
-        self._native = self._compiled()
-
-    def _compiled(self) -> CompiledExchange | None:
-        """What steps in C, where settings, plant and bank are of the common kind."""
         s = self.settings
         usual = self._plain and self._all_give_work and self._refresh and s.plant_substeps == 1
         if not usual or s.tolerance_j is not None:
-            return None
-        return compiled_exchange(self.plant, self.bank, self._ledger, self.force, s.step)
+            self._native = None
+        else:
+            self._native = compiled_exchange(self.plant, self.bank, self._ledger, self.force, s.step)
 
     @property
     def difference(self) -> Float:
-        """(count,) work of the plant minus work of the actuator since the start [J]."""
+        """(count,) work of the plant minus work of the actuator [J]."""
         lost: Float = self._ledger.sums()[0].copy()
         return lost
 
@@ -116,13 +103,7 @@ class Master:
         command: Float | float = 0.0,
         parameters: Sequence[Mapping[str, Any]] | None = None,
     ) -> None:
-        """Start the bank at the plant's present motion. The plant feels the forces from then on.
-
-        Args:
-            time: [s].
-            command: (count,) first inputs.
-            parameters: of every actuator, on top of the bank's own.
-        """
+        """Start the bank at the plant's motion and at `time` [s], with its forces acting from then on."""
         motion = self.plant.motion(np.zeros(self.bank.count))
         self._show(motion.position, motion.velocity, 0.0)
         self.bank.u[:, self._column["command"]] = command
@@ -132,46 +113,35 @@ class Master:
         self._ledger.start()
 
     def step(self, command: Float | float) -> bool:
-        """One macro step H under a command (count,). Returns False if an actuator has failed (see `trouble`)."""
+        """Do a macro step under a command (count,). Returns False if an actuator failed (see `trouble`)."""
         self.bank.u[:, self._column["command"]] = command
         if self.settings.tolerance_j is None:
             return self._exchange(self.settings.step)
-        return self._halving(self.settings.tolerance_j)
-
-    def _halving(self, tolerance: float) -> bool:
-        """H in parts, each small enough for the bond error. Parts are H / 2^n, so that they end on H exactly."""
         whole, level, done = self.settings.step, 0, 0.0
         deepest = max(0, int(np.floor(np.log2(whole / self.settings.least_step))))
         begin = self.time
         while done < 1.0:
             part = 0.5**level
-            self._keep()
+            self.plant.save()
+            self.bank.save()
+            self._kept = (self.time, self.steps, self.force.copy(), self._ledger.sums().copy())
             fine = self._exchange(whole * part)
-            if (not fine or self.mismatch.max() > tolerance) and level < deepest:
-                self._return()
+            if (not fine or self.mismatch.max() > self.settings.tolerance_j) and level < deepest:
+                self.plant.restore()
+                self.bank.restore()
+                self.time, self.steps, self.force, sums = self._kept
+                self._ledger.restore(sums)
                 level += 1
                 continue
             if not fine:
                 return False
             done += part
             self.time = begin + done * whole
-            if level and self.mismatch.max() < tolerance / 16 and (done / (2 * part)).is_integer():
+            if level and self.mismatch.max() < self.settings.tolerance_j / 16 and (done / (2 * part)).is_integer():
                 level -= 1
         return True
 
-    def _keep(self) -> None:
-        self.plant.save()
-        self.bank.save()
-        self._kept = (self.time, self.steps, self.force.copy(), self._ledger.sums().copy())
-
-    def _return(self) -> None:
-        self.plant.restore()
-        self.bank.restore()
-        self.time, self.steps, self.force, sums = self._kept
-        self._ledger.restore(sums)
-
     def _show(self, position: Float, velocity: Float, acceleration: Float | float | None) -> None:
-        """Inputs of the bank. Without an acceleration it keeps that of the step's begin."""
         at_position, at_velocity, at_acceleration = self._shown
         at_position[:], at_velocity[:] = position, velocity
         if acceleration is not None:
@@ -186,7 +156,12 @@ class Master:
         begin = self.plant.motion(self.force)
         fine, given = self._actuate(begin, step)
         after = self._felt(self.force)
-        self._advance(after, step)
+        parts = self.settings.plant_substeps
+        if parts == 1:
+            self.plant.advance(self.force, after, step)
+        for j in range(parts if parts > 1 else 0):
+            from_, to = (self.force + share * (after - self.force) for share in (j / parts, (j + 1) / parts))
+            self.plant.advance(from_, to, step / parts)
         if self._where is None:
             x, v, a = self.plant.motion(after)
         else:
@@ -204,15 +179,13 @@ class Master:
         return fine
 
     def _felt(self, before: Float) -> Float:
-        """Forces (count,) of the bank. Where an actuator has ended, its last force."""
         force = self.bank.y[:, self._force]
         ended = 0 in self.bank.active.tobytes()
         return np.where(self.bank.active > 0, force, before) if ended else force.copy()
 
     def _actuate(self, begin: Motion, step: float) -> tuple[bool, Float]:
-        """Step the bank along the parabola of the motion. Returns (all well, work that the actuators gave)."""
         x, v, a = begin
-        if self._plain and self._all_give_work:  # the common case of what follows, the same numbers in fewer calls
+        if self._plain and self._all_give_work:
             self._show(x, v, a)
             return self.bank.step(self.time, step), self.bank.y[:, self._work].copy()
         count = self.settings.actuator_substeps if self._takes_acceleration else self.settings.plain_substeps
@@ -229,23 +202,13 @@ class Master:
         assumed = bond_work(self.force, self.bank.y[:, self._force], path, v, v + a * step, step)
         return fine, np.where(self._gives_work, given, assumed)
 
-    def _advance(self, after: Float, step: float) -> None:
-        count = self.settings.plant_substeps
-        if count == 1:
-            self.plant.advance(self.force, after, step)
-            return
-        for j in range(count):
-            shares = (j / count, (j + 1) / count)
-            begin, end = (self.force + share * (after - self.force) for share in shares)
-            self.plant.advance(begin, end, step / count)
-
     @property
     def residual(self) -> Float:
-        """(count,) energy that the coupling made or lost, relative to what was exchanged."""
+        """(count,) relative energy error of the coupling."""
         return relative_residual(self.difference, self.exchanged)
 
     def trouble(self) -> dict[int, str]:
-        """A sentence for every bond that has failed or whose residual is above the limit."""
+        """Message by bond for failures and high residuals."""
         found = {i: text for i in range(self.bank.count) if (text := self.bank.problem(i))}
         high: NDArray[np.int64] = np.flatnonzero(self.residual > self.settings.residual_limit)
         for i in high:

@@ -1,14 +1,12 @@
-r"""Electric servos as FMUs: what robot.toml says of them, how a joint torque becomes their input, and what is refused.
+r"""Electric servos as FMUs: declaration, conversion of joint torques to inputs, and checks.
 
-A servo takes a torque, or a motor position for its inner loop. Which of the two is said by the mapping alone: our input
-`torque` or our input `target`. With K_p and K_v the inner loop's gains and k the stiffness of the spring, all at the
-joint, the torque tau of the law becomes the position
+A servo takes the input `torque`, or `target`, a position of its inner loop. With the loop's gains K_p and K_v and
+spring stiffness k at the joint, a torque tau becomes
 
     target = q + tau (1/K_p + 1/k) + (K_v/K_p) \dot\theta
 
-which the inner loop and the spring turn back into tau at rest: a torque-position transformer (Khatib, Thaulad,
-Yoshikawa and Park, ICRA 2008), with the spring included by us. In terms of torques the motor then gives
-tau + (K_p/k) (tau - tau_s), a torque loop around the spring's tau_s that also makes friction and rotor count less.
+which gives tau at rest: a torque-position transformer (Khatib, Thaulad, Yoshikawa and Park, ICRA 2008) with spring. The
+motor torque tau + (K_p/k) (tau - tau_s) closes a loop around the spring's tau_s.
 """
 
 from __future__ import annotations
@@ -18,27 +16,26 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.cosim.plant import Float
+from skillframe.cosim.energy_balance import Float
 from skillframe.errors import InputError
 from skillframe.fmu.actuator import Actuators, ActuatorSpec
-from skillframe.fmu.kept import kept
-from skillframe.fmu.opening import open_actuators
-from skillframe.robot.driven import Actuation
+from skillframe.fmu.opening import kept, open_actuators
 from skillframe.robot.spec import RobotSpec
+from skillframe.robot.tables import Actuation
 
 COMMANDS = ("torque", "target")
-"""Our names of what a servo may be told; exactly one of them is mapped."""
+"""Inputs of a servo, of which exactly one is mapped."""
 SERVO = "electric_servo"
 
 
 class Servos(NamedTuple):
-    """The controller's k servos, each (k,).
+    """Nominal values of k servos, each (k,).
 
     Attributes:
-        share: command per torque of the law: 1, or 1/K_p + 1/k [rad/(N m)].
-        holds: 1 where a servo takes a position, else 0.
+        share: command per torque: 1, or 1/K_p + 1/k [rad/(N m)].
+        holds: 1 for position servos, else 0.
         lead: K_v/K_p [s] of position servos, else 0.
-        inertia: of rotor and gear as the law feels it at the joint [kg m^2]: with K_p, divided by 1 + K_p/k.
+        inertia: effective, of rotor and gear at the joint [kg m^2]: with K_p, divided by 1 + K_p/k.
     """
 
     share: Float
@@ -47,12 +44,12 @@ class Servos(NamedTuple):
     inertia: Float
 
     def command(self, torque: Float, position: Float, velocity: Float) -> Float:
-        """What the servos are told (N, k), from torques of the law, joint positions and motor velocities (N, k)."""
+        """Servo commands (N, k) from joint torques, joint positions and motor velocities (N, k)."""
         return torque * self.share + self.holds * (position + self.lead * velocity)
 
 
 def servos(spec: RobotSpec) -> Servos:
-    """What the controller takes a robot's servos for.
+    """Nominal servos of a robot.
 
     Raises:
         InputError: as `require_servos`.
@@ -65,13 +62,13 @@ def servos(spec: RobotSpec) -> Servos:
         share = 1.0 / gain + 1.0 / stiffness if holds else 1.0
         lead = float(known.get("velocity_gain", 0.0)) / gain if holds else 0.0
         gear, rotor = (float(known.get(name, plain)) for name, plain in (("gear", 1.0), ("rotor_inertia", 0.0)))
-        less = 1.0 + gain / stiffness if holds else 1.0  # the torque loop around the spring
+        less = 1.0 + gain / stiffness if holds else 1.0
         rows.append((share, float(holds), lead, gear**2 * rotor / less))
     return Servos(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
 def actuator_specs(spec: RobotSpec) -> list[ActuatorSpec]:
-    """The servos as the bank takes them, with what they are told as its `command`."""
+    """Servos for the bank, with their input as `command`."""
     return [
         ActuatorSpec(
             fmu=a.fmu, parameters=dict(a.parameters), outputs=dict(a.outputs), name=a.joint,
@@ -82,7 +79,7 @@ def actuator_specs(spec: RobotSpec) -> list[ActuatorSpec]:
 
 
 def open_servos(spec: RobotSpec, trials: int) -> Actuators:
-    """A bank of a robot's servos for so many trials, kept between runs.
+    """Cached bank of a robot's servos for `trials`.
 
     Raises:
         InputError, UnknownName, MissingDependency, InstanceFailed: an FMU cannot be opened, or lacks a mapped name.
@@ -92,15 +89,10 @@ def open_servos(spec: RobotSpec, trials: int) -> Actuators:
 
 
 def start_parameters(spec: RobotSpec, hold: Float, friction: Float | None) -> list[dict[str, float]]:
-    """Parameters of every instance, trial by trial: the torque that it holds at the start, and its friction.
-
-    Args:
-        spec: of the robot.
-        hold: (N, k) torques at the joints [N m].
-        friction: (N,) factors of what is called friction, or None.
+    """Parameters of every instance: initial torque (N, k) [N m], and friction scaled by factors (N,).
 
     Raises:
-        InputError: friction is varied, and no parameter is called so.
+        InputError: friction varies, but no parameter name ends with _friction.
     """
     frictions = [[name for name in a.parameters if name.endswith("_friction")] for a in spec.actuation]
     if friction is not None and not any(frictions):
@@ -118,15 +110,15 @@ def start_parameters(spec: RobotSpec, hold: Float, friction: Float | None) -> li
 
 
 def unfit_servo(actuation: Actuation) -> Iterator[tuple[str, str]]:
-    """What is missing or impossible in a servo's entry: what is wrong, and the cure."""
+    """Problem and fix of each invalid value in a servo's entry."""
     who, told = f"the servo on {actuation.joint}", [name for name in COMMANDS if name in actuation.inputs]
     if not told:
-        text = f"{who} is told nothing: its inputs map neither torque nor target"
+        text = f"{who} has no command: its inputs map neither torque nor target"
         yield text, 'add inputs = { torque = "..." } for a torque [N m], or { target = "..." } for a position [rad]'
     if len(told) == 2:
-        yield f"{who} is told a torque and a target", "map one of them, and name the other in unused"
+        yield f"{who} has two commands, torque and target", "map one of them, and name the other in unused"
     if "command" in actuation.inputs:
-        yield f"{who} maps command, which is a valve's", "write torque or target instead"
+        yield f"{who} maps command, which no servo takes", "write torque or target instead"
     known = actuation.known
     if "target" in actuation.inputs and not _above_zero(known.get("position_gain")):
         text = f"{who} takes a target, and its position_gain [N m/rad] is not known"
@@ -140,10 +132,10 @@ def unfit_servo(actuation: Actuation) -> Iterator[tuple[str, str]]:
 
 
 def require_servos(spec: RobotSpec) -> None:
-    """Refuse a robot whose servos' entries are missing or impossible.
+    """Refuse a robot with invalid servos.
 
     Raises:
-        InputError: names the file, the first such servo, and what to do.
+        InputError: names file, servo and fix.
     """
     for actuation in spec.actuation:
         for problem, fix in unfit_servo(actuation):
@@ -151,5 +143,4 @@ def require_servos(spec: RobotSpec) -> None:
 
 
 def _above_zero(value: object) -> bool:
-    """Whether it is a positive, finite number."""
     return isinstance(value, int | float) and not isinstance(value, bool) and 0.0 < value < np.inf

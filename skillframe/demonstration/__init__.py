@@ -1,1 +1,1 @@
-"""Demonstrations: the record, its audit, and the readers and writers of files."""
+"""Demonstrations: the record, its checks, and readers and writers of files."""

@@ -1,9 +1,9 @@
-"""Named columns of a file as a clock, poses and wrenches in SI units: names, units, attitudes.
+"""Named columns of a file as clock, poses and wrenches in SI units.
 
-An attitude can be a quaternion (qx, qy, qz, qw), Euler angles (roll, pitch, yaw: about x, y, z whatever the order), a
-rotation vector (rvx, rvy, rvz) or a matrix (r11 ... r33, by rows). Euler angles are multiplied out in the stated order,
-R = R_c(c) R_b(b) R_a(a) about fixed axes a, b, c (lower case) and R_a(a) R_b(b) R_c(c) about moving ones (upper case),
-scipy's convention; the columns are taken by axis.
+An orientation is a quaternion (qx, qy, qz, qw), Euler angles (roll, pitch, yaw: about x, y, z in any order), a rotation
+vector (rvx, rvy, rvz) or a matrix (r11 ... r33, by rows). Euler angles follow scipy's convention: R = R_c(c) R_b(b)
+R_a(a) about fixed axes a, b, c (lower case), R_a(a) R_b(b) R_c(c) about moving ones (upper case). The columns are taken
+by axis.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skillframe.demonstration.options import scales
 from skillframe.demonstration.table import Table
@@ -27,7 +28,6 @@ ROTATION_VECTOR = ("rvx", "rvy", "rvz")
 MATRIX = tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
 CANONICAL = ("t", *POSITION, *QUATERNION, *WRENCH)
 SECONDS, NANOSECONDS = "sec", "nsec"
-"""A clock in two columns."""
 KNOWN = (*CANONICAL, *EULER, *ROTATION_VECTOR, *MATRIX)
 QUANTITY = {
     "t": "time", **dict.fromkeys(POSITION, "length"), **dict.fromkeys((*EULER, *ROTATION_VECTOR), "angle"),
@@ -37,18 +37,18 @@ ALIASES = {
     "time": "t", "timestamp": "t", "stamp": "t", "x": "px", "y": "py", "z": "pz", "pos_x": "px", "pos_y": "py",
     "pos_z": "pz", "mx": "tx", "my": "ty", "mz": "tz", "secs": SECONDS, "nsecs": NANOSECONDS, "nanosec": NANOSECONDS,
 }  # fmt: skip
-"""Names that other tools use: suggested for a header, which is never guessed, and taken where the user wrote them."""
+"""Names that other tools use: suggested for a header, accepted in settings."""
 
 
 class Columns(dict[str, Float]):
-    """Columns by name, with where they came from and how their rows are called in messages."""
+    """Columns by name, with their source and row numbers for messages."""
 
     def __init__(self, values: Mapping[str, Float], source: str, rows: Sequence[int] | None = None) -> None:
         super().__init__(values)
         self.source, self.rows = source, rows
 
     def place(self, row: int, column: str = "") -> str:
-        """Where a value stands: "file: row N, column c", rows counted as an editor does."""
+        """Place of a value, "file: row N, column c", rows counted as in an editor."""
         number = row + 1 if self.rows is None else int(self.rows[row])
         return f"{self.source}: row {number}" + (f", column {column}" if column else "")
 
@@ -56,8 +56,13 @@ class Columns(dict[str, Float]):
         """Other values of the same rows."""
         return Columns(values, self.source, self.rows)
 
+    def where(self, keep: NDArray[np.bool_]) -> Columns:
+        """The rows of a mask (T,)."""
+        rows = None if self.rows is None else np.asarray(self.rows)[keep].tolist()
+        return Columns({name: column[keep] for name, column in self.items()}, self.source, rows)
+
     def has(self, names: Iterable[str]) -> bool:
-        """Whether every one of these columns is there."""
+        """Whether all of these columns exist."""
         return all(name in self for name in names)
 
     def stack(self, names: Sequence[str]) -> Float:
@@ -68,13 +73,8 @@ class Columns(dict[str, Float]):
 def name_columns(table: Table, spec: str | None, units: str | None) -> Columns:
     """A table's columns under their names and in SI units.
 
-    Args:
-        table: as read.
-        spec: `ReadOptions.columns`; None to use the header.
-        units: `ReadOptions.units`.
-
     Raises:
-        InputError: no header and no names, too many or few names, a name twice, words where numbers belong.
+        InputError: neither header nor names, a wrong number of names, a repeated name, or words in place of numbers.
     """
     picks = _picks(table, spec)
     factors = scales(units)
@@ -85,43 +85,33 @@ def name_columns(table: Table, spec: str | None, units: str | None) -> Columns:
             continue
         if index in table.text:
             if name.rpartition("_")[2] in KNOWN:
-                _refuse_words(table, index, name)
+                row, said = table.text[index]
+                comma = said.count(",") == 1 and said.replace(",", "").replace("-", "").replace("+", "").isdigit()
+                fix = "separate cells that have a decimal comma by semicolons or tabs" if comma else "fix that cell"
+                raise InputError(f"{table.source}: row {row}, column {name}", f"is not a number ({said[:40]!r})", fix)
             continue
         factor = factors.get(QUANTITY.get(name.rpartition("_")[2], ""), 1.0)
         columns[name] = table.values[:, index] * factor if factor != 1.0 else table.values[:, index].copy()
-    return Columns(_one_clock(columns), table.source, table.rows.tolist())
-
-
-def _one_clock(columns: dict[str, Float]) -> dict[str, Float]:
-    """Columns whose clock stood in two, whole seconds and nanoseconds, as headers of ROS do."""
     for name in [name for name in columns if name.rpartition("_")[2] == SECONDS]:
         arm = name.removesuffix(SECONDS)
         if f"{arm}t" not in columns and f"{arm}{NANOSECONDS}" in columns:
             columns[f"{arm}t"] = columns.pop(name) + 1e-9 * columns.pop(f"{arm}{NANOSECONDS}")
-    return columns
-
-
-def _refuse_words(table: Table, index: int, name: str) -> None:
-    row, said = table.text[index]
-    comma = said.count(",") == 1 and said.replace(",", "").replace("-", "").replace("+", "").isdigit()
-    fix = "separate cells that have a decimal comma by semicolons or tabs" if comma else "fix that cell"
-    raise InputError(f"{table.source}: row {row}, column {name}", f"is not a number ({said[:40]!r})", fix)
+    return Columns(columns, table.source, table.rows.tolist())
 
 
 def left_out(table: Table) -> list[str]:
-    """Sentences about columns of words, which a demonstration has no place for."""
+    """Sentences on columns of words, which are left out."""
     return [
         f"column {table.names[i] if table.names else i + 1} holds words and was left out" for i in sorted(table.text)
     ]
 
 
 def _picks(table: Table, spec: str | None) -> dict[str, int]:
-    """Column index by name."""
     width = table.values.shape[1]
     if spec is None and not table.names:
         raise InputError(
             f"{table.source}: row {table.rows[0]}", "has no header",
-            "add the header t,px,py,pz,qx,qy,qz,qw,fx,fy,fz,tx,ty,tz or name the columns with --columns",
+            "add the header t,px,py,pz,qx,qy,qz,qw,fx,fy,fz,tx,ty,tz or give --set columns (see --layout auto)",
         )  # fmt: skip
     names = table.names if spec is None else split_names(spec)
     if spec is not None and "=" in spec:
@@ -132,20 +122,19 @@ def _picks(table: Table, spec: str | None) -> dict[str, int]:
         return _unique(table.source, [(name, _column(table, column)) for name, column in pairs])
     if len(names) != width:
         raise InputError(
-            table.source, f"has {width} columns, --columns names {len(names)}",
+            table.source, f"has {width} columns, and columns names {len(names)}",
             'name every column in order, "_" for one to ignore, or pick by header with NAME=COLUMN',
         )  # fmt: skip
     return _unique(table.source, [(name, i) for i, name in enumerate(names) if name not in ("_", "")])
 
 
 def split_names(spec: str) -> list[str]:
-    """The names of a list of columns, separated by commas or else blanks. Familiar other names are understood."""
+    """Names of a list separated by commas or blanks, aliases resolved."""
     names = [name.strip() for name in (spec.split(",") if "," in spec else spec.split())]
     return [name if "=" in name else ALIASES.get(name, name) for name in names]
 
 
 def _column(table: Table, column: str) -> int:
-    """Index of a column by header name or number from 1."""
     if column in table.names:
         return table.names.index(column)
     if column.isdigit() and 1 <= int(column) <= table.values.shape[1]:
@@ -164,16 +153,29 @@ def _unique(source: str, pairs: list[tuple[str, int]]) -> dict[str, int]:
 
 
 def select_arm(columns: Columns, arm: str | None) -> Columns:
-    """One arm's columns without their prefix. Everything else stays as it is.
+    """One arm's columns without their prefix, and all columns of no arm.
 
     Raises:
         InputError: several arms and none chosen, no such arm, or arms whose clocks differ.
     """
     arms = sorted({name[: -len("_px")] for name in columns if name.endswith("_px")})
-    _refuse_different_clocks(columns, arms)
+    # a row is one moment of all arms
+    found = {arm: columns.get(f"{arm}_t", columns.get("t")) for arm in arms}
+    clocks = {arm: clock for arm, clock in found.items() if clock is not None}
+    for (one, first), (other, second) in pairwise(clocks.items()):
+        apart = np.abs(first - second)
+        # a tenth of a sample allows for stamps taken one after the other
+        if len(first) > 1 and apart.max() > 0.1 * abs(float(np.median(np.diff(first)))):
+            raise InputError(
+                columns.place(int(np.argmax(apart))),
+                f"the clocks of the arms {one} and {other} differ by {1e3 * apart.max():.3g} ms",
+                "resample the arms onto one clock, or write a file for each",
+            )
     if arm is None:
         if arms and "px" not in columns:
-            raise InputError(columns.source, f"holds the arms {', '.join(arms)}", f"choose one with --arm {arms[0]}")
+            raise InputError(
+                columns.source, f"holds the arms {', '.join(arms)}", f"choose one with --set arm={arms[0]}"
+            )
         return columns
     if arm not in arms:
         raise InputError(columns.source, f"has no arm {arm!r}", f"there are: {', '.join(arms) or 'none'}")
@@ -183,30 +185,15 @@ def select_arm(columns: Columns, arm: str | None) -> Columns:
     return columns.with_values({**kept, **{n: columns[prefix + n] for n in own}})
 
 
-def _refuse_different_clocks(columns: Columns, arms: Sequence[str]) -> None:
-    """A row of a file holds one moment of all its arms: their own clocks, ARM_t, must agree with each other."""
-    found = {arm: columns.get(f"{arm}_t", columns.get("t")) for arm in arms}
-    clocks = {arm: clock for arm, clock in found.items() if clock is not None}
-    for (one, first), (other, second) in pairwise(clocks.items()):
-        apart = np.abs(first - second)
-        # a tenth of a sample: stamps of one moment taken one after the other differ by less
-        if len(first) > 1 and apart.max() > 0.1 * abs(float(np.median(np.diff(first)))):
-            raise InputError(
-                columns.place(int(np.argmax(apart))),
-                f"the clocks of the arms {one} and {other} differ by {1e3 * apart.max():.3g} ms",
-                "resample the arms onto one clock, or write a file for each",
-            )
-
-
 def with_quaternion(columns: Columns, euler: str | None) -> Columns:
-    """The same columns with the attitude as a quaternion, whatever form it came in.
+    """The same columns with the orientation as a quaternion.
 
     Raises:
         InputError: Euler angles without their order, a bad order, or a matrix that is no rotation.
     """
     if columns.has(QUATERNION):
         if euler is not None:
-            raise InputError(columns.source, "holds quaternions, no Euler angles", "leave --euler away")
+            raise InputError(columns.source, "holds quaternions, no Euler angles", "leave euler out")
         return columns
     for names, convert in ((EULER, _from_euler), (ROTATION_VECTOR, _from_vector), (MATRIX, _from_matrix)):
         if columns.has(names):
@@ -223,7 +210,7 @@ def _from_euler(columns: Columns, euler: str | None) -> Float:
     if not proper:
         what = f"the order {euler!r} is not one of x, y, z" if euler else "has roll, pitch, yaw without their order"
         raise InputError(
-            columns.source, what, "give --euler xyz (fixed axes) or --euler ZYX (moving axes), for example"
+            columns.source, what, "give --set euler=xyz (fixed axes) or --set euler=ZYX (moving axes), for example"
         )
     result = np.eye(3)
     for axis in axes:

@@ -1,6 +1,6 @@
 """The native form: one array per column and a JSON text `meta` with format and version, in an uncompressed npz.
 
-An npz file without metadata is foreign: its arrays are named with `--columns`, as those of other tools' files are.
+An npz file without metadata is read as arrays of another tool, if `--set columns` names them.
 """
 
 from __future__ import annotations
@@ -13,58 +13,45 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.demonstration.arrays import read_as_table, table_of
+from skillframe.demonstration.assemble import assemble_split, read_wrench_file
 from skillframe.demonstration.columns import KNOWN, Columns
 from skillframe.demonstration.csv import demonstration_columns
-from skillframe.demonstration.delimited import read_wrench_file
-from skillframe.demonstration.merged import assemble_split
-from skillframe.demonstration.options import ReadOptions, read_options
+from skillframe.demonstration.options import read_options
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
 from skillframe.files import write_whole
-from skillframe.files.npz import json_member, read_arrays
+from skillframe.files.documents import json_member, read_arrays
 from skillframe.frames import Float
 
 FORMAT, VERSION = "skillframe.demonstration", 1
 
 
 def read_npz(path: Path, options: Mapping[str, Any]) -> Demonstration:
-    """A demonstration from its native form.
-
-    Args:
-        path: the file.
-        options: fields of `ReadOptions`; those that name columns do not apply.
+    """Read a demonstration from its native form.
 
     Raises:
         InputError: no npz, of another format or a newer version, or anything of the contract's list of bad input.
     """
     chosen = read_options(options)
     arrays = read_arrays(path, "npz file", "write it again")
-    if "meta" not in arrays and chosen.columns is not None:
-        left = list[str]()
-        return read_as_table(path, options, table_of(str(path), arrays, left), left)
-    _refuse_text_settings(path, chosen)
+    for name in ("columns", "units"):
+        if getattr(chosen, name) is not None:
+            raise InputError(
+                path, f"{name} does not apply to the native form", "leave it out; its arrays are named, in SI units"
+            )
     meta = _meta(path, arrays)
     notes = list[str]()
     columns = Columns(_columns(path, arrays, notes), str(path))
     return assemble_split(columns, meta, chosen, notes, read_wrench_file(chosen))
 
 
-def _refuse_text_settings(path: Path, options: ReadOptions) -> None:
-    for name in ("columns", "units"):
-        if getattr(options, name) is not None:
-            raise InputError(
-                path, f"--{name} does not apply to the native form", "leave it out; its arrays are named, in SI units"
-            )
-
-
 def _meta(path: Path, arrays: dict[str, Any]) -> dict[str, Any]:
-    """The metadata, with format and version checked and taken off."""
     if "meta" not in arrays:
         raise InputError(
             path,
             "holds no meta",
-            f"name its arrays with --columns (auto proposes them), or store a JSON text meta with format {FORMAT!r}",
+            "name its arrays with --set columns (--layout auto proposes them), or store a JSON text meta with format "
+            f"{FORMAT!r}",
         )
     meta = json_member(path, arrays, "meta", "store one JSON text")
     if meta is None:
@@ -82,13 +69,13 @@ def _meta(path: Path, arrays: dict[str, Any]) -> dict[str, Any]:
 
 
 def _columns(path: Path, arrays: dict[str, Any], notes: list[str]) -> dict[str, Float]:
-    """One number per sample and name. What else the file holds beside them is left out with a note."""
+    """One number per sample and name. Other arrays are left out with a note."""
     columns: dict[str, Float] = {}
     for name, array in arrays.items():
         if name == "meta":
             continue
         fits = array.ndim == 1 and array.dtype.kind in "fiub"
-        if not fits and "t" in arrays and _further(name):
+        if not fits and "t" in arrays and (not any(name == known or name.endswith(f"_{known}") for known in KNOWN)):
             notes.append(f"array {name}, {array.dtype} of shape {array.shape}, was left out")
             continue
         if not fits:
@@ -106,13 +93,8 @@ def _columns(path: Path, arrays: dict[str, Any], notes: list[str]) -> dict[str, 
     return columns
 
 
-def _further(name: str) -> bool:
-    """Whether a name is none of a demonstration's channels, of any arm."""
-    return not any(name == known or name.endswith(f"_{known}") for known in KNOWN)
-
-
 def write_npz(demonstration: Demonstration, path: Path) -> None:
-    """Write the native form. The file appears complete or not at all."""
+    """Write the native form as a whole."""
     meta = {"quaternion": "xyzw", **demonstration.meta, "format": FORMAT, "version": VERSION}
     columns = demonstration_columns(demonstration)
     if "meta" in columns:

@@ -1,8 +1,7 @@
-"""The demonstration record: what a person did, as pose and wrench over time, in one convention.
+"""The demonstration record: pose and wrench over time, in one convention.
 
-Wherever the data came from, a `Demonstration` holds the pose of the tool point in base and the wrench that the
-environment exerts on the tool at that point, in base axes, without bias and without the tool's weight. Readers convert;
-nothing after them asks again.
+A `Demonstration` holds the pose of the tool point in base and the wrench that the environment exerts on the tool at
+that point, in base axes, without bias and without the tool's weight. Readers convert to it.
 """
 
 from __future__ import annotations
@@ -14,9 +13,7 @@ from typing import Any
 import numpy as np
 
 from skillframe.config import parse_numbers
-from skillframe.config.of_runs import CENTER
-from skillframe.config.ranges import require_within
-from skillframe.config.units import parse, si
+from skillframe.config.units import CENTER, parse, require_within, si
 from skillframe.errors import InputError, UnknownName
 from skillframe.frames import Float, Pose, matrix_from_quaternion
 
@@ -30,14 +27,13 @@ class Demonstration:
     Attributes:
         time: (T,) seconds, strictly increasing.
         position: (T, 3) tool point in base [m].
-        quaternion: (T, 4) tool attitude in base, x, y, z, w, unit norm.
+        quaternion: (T, 4) tool orientation in base, x, y, z, w, unit norm.
         wrench: (T, 6) environment on tool, force then torque [N, Nm], at the tool point, base axes.
-        meta: metadata as written in the file: `task`, `rate`, `teacher` (kinesthetic | teleoperation), `frames`
+        meta: metadata as in the file, JSON values: `task`, `rate`, `teacher` (kinesthetic | teleoperation), `frames`
             ({name: [x, y, z]} points in the tool frame), `hand` (a name of `frames`, or a point), `contact` (bool),
-            `sensor` ({`force_noise`, `torque_noise`} standard deviations), `licence`, `notes`, and whatever the file
-            held besides. Plain JSON values only.
-        extra: further columns, name -> (T,) array, kept as they were.
-        source: file that it was read from, for messages; empty if made in memory.
+            `sensor` ({`force_noise`, `torque_noise`} standard deviations), `licence`, `notes`, and others.
+        extra: further columns, name -> (T,) array.
+        source: its file, for messages; empty if made in memory.
     """
 
     time: Float
@@ -80,7 +76,7 @@ class Demonstration:
         return float(1.0 / np.median(np.diff(self.time)))
 
     def between(self, start: float | None = None, stop: float | None = None) -> Demonstration:
-        """The part with start <= t <= stop [s]. The clock is kept.
+        """The part with start <= t <= stop [s], on the same clock.
 
         Raises:
             InputError: fewer than two samples remain.
@@ -102,7 +98,7 @@ class Demonstration:
         )  # fmt: skip
 
     def point(self, name: str | None) -> Float:
-        """A point of the tool frame: "x,y,z" in metres, a name of `meta["frames"]`, or the tool point itself for None.
+        """A point of the tool frame: "x,y,z" in metres, a name of `meta["frames"]`, or None for the tool point.
 
         Raises:
             UnknownName: no such frame.
@@ -115,7 +111,7 @@ def resolve_point(text: str | None, frames: Mapping[str, Any], where: str = "") 
 
     Raises:
         UnknownName: the text is neither three numbers nor a known name.
-        InputError: a unit of another dimension, or a point further away than tools are long.
+        InputError: a unit of another dimension, or a point out of range.
     """
     if text is None or (text in POINT_ALIASES and text not in frames):
         return np.zeros(3)

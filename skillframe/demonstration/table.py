@@ -1,8 +1,15 @@
-"""Delimited text as named columns of numbers, with the file's row numbers kept for messages.
+"""Delimited text as named columns of numbers, with the file's row numbers for messages.
 
-Rows are counted as an editor counts lines, from 1. Commas, semicolons, tabs and blanks are told apart by the first
-rows. Where cells are not separated by commas, a comma in a number is a decimal comma. A file that has decimal points
-too is refused, because one of them may part thousands. An empty cell is no value. Dates and times become seconds.
+Rows are counted from 1. Unless the separator is a comma, a comma in a number is a decimal comma; a file that has
+decimal points too is refused, since one of them may separate thousands. An empty cell is no value. Dates and times
+become seconds.
+
+Clocks as text and in two columns: dates with a time, times of day, and seconds beside nanoseconds.
+
+Date and time are separated by T, a blank, a slash, an underscore, or one of them and blanks. Both may lack separators
+(ISO 8601, basic form), and seconds are optional. A date counts as seconds since 1970 in UTC, or in its zone; a double
+resolves 0.24 us there. A time of day counts from midnight, and a day is added where it runs back by more than half of
+one.
 """
 
 from __future__ import annotations
@@ -11,18 +18,21 @@ import codecs
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.stamps import seconds
 from skillframe.errors import InputError
 from skillframe.frames import Float
 
+MOST_ABOVE = 40
+"""Rows searched for a header; motion capture writes 7 above it, data loggers about 25."""
+BEGINS = re.compile(r'[\s"]*[-+]?[.,]?\d')
 CONTROL = [chr(code) for code in range(32) if chr(code) not in "\t\n\r\f\v"]
-"""Characters that no table holds; random bytes nearly always do."""
+"""Characters that no table holds, but nearly all binary files."""
 DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?|[-+]?\d+,")
 
 
@@ -32,12 +42,13 @@ class Table:
 
     Attributes:
         source: the file.
-        names: of the header; empty where there is none.
-        values: (T, C) numbers, NaN where `text` says that a column holds words.
+        names: of the header, or empty.
+        values: (T, C) numbers, NaN in the columns of `text`.
         rows: (T,) row numbers in the file, from 1.
-        text: indices of columns that are not numbers, with the first offending row and what it says.
-        stamps: (T,) seconds of those columns of `text` that hold a date or a time of day in every row.
-        blank: (T, C) which cells are empty; None where none is.
+        text: columns that are not numbers, by index, with the first offending row and its cell.
+        stamps: (T,) seconds of those columns of `text` that hold dates or times of day.
+        blank: (T, C) which cells are empty, or None.
+        single: numbers that the file holds once, by name.
     """
 
     source: str
@@ -47,6 +58,7 @@ class Table:
     text: dict[int, tuple[int, str]]
     stamps: dict[int, Float] = field(default_factory=dict)
     blank: NDArray[np.bool_] | None = None
+    single: dict[str, float] = field(default_factory=dict)
 
 
 def read_text(path: Path) -> str:
@@ -65,23 +77,28 @@ def read_text(path: Path) -> str:
         raise InputError(path, f"cannot be read ({error.strerror})", "check its permissions") from None
     if not raw.strip():
         raise InputError(path, "is empty", "give a file with a header and rows")
+    if raw[:2] in [bytes([0x80, version]) for version in range(2, 6)]:
+        raise InputError(
+            path, "is a pickle, which can run any program while it is read, and is never opened",
+            "save its arrays with numpy.savez where it was made, and give the .npz",
+        )  # fmt: skip
     if raw[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
         raise InputError(path, "is UTF-16 text", "save it as UTF-8")
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
-        text = raw.decode("latin-1")  # a degree sign of an old editor, or not text at all
+        text = raw.decode("latin-1")  # an old editor's degree sign, or no text
     if any(c in text for c in CONTROL):
         raise InputError(path, "is binary, not text", "give delimited text, or name a native file .npz")
     return text
 
 
 def read_table(path: Path, header: bool | None = None) -> Table:
-    """A delimited file as a table.
+    """Read a delimited file as a table.
 
     Args:
         path: the file.
-        header: whether the first row is a header; None to see for itself.
+        header: whether the first row is a header; None detects it.
 
     Raises:
         InputError: not text, no rows, or rows of different length.
@@ -90,63 +107,22 @@ def read_table(path: Path, header: bool | None = None) -> Table:
     lines = [(i, line) for i, line in lines if line]
     delimiter = _delimiter(lines[0][1], lines[-1][1])
     names: list[str] = []
+    if header is None:
+        lines = lines[_preamble(lines, delimiter) :]
     while lines and lines[0][1][0] in "#%" and not header and not _looks_like_header(lines, delimiter):
         lines = lines[1:]
     if lines and (header or (header is None and not _is_numeric(lines[0][1], delimiter))):
         names = [name.strip().strip('"') for name in _split(lines[0][1].lstrip("#% "), delimiter)]
         lines = lines[1:]
+        for _ in range(_more_names(lines, delimiter, len(names)) if header is None else 0):
+            below = _split(lines[0][1].lstrip("#% "), delimiter)
+            cells = [cell.strip().strip('"') for cell in below]
+            names = [f"{name} {cell}".strip() for name, cell in zip(names, cells, strict=True)]
+            lines = lines[1:]
     if not lines:
         raise InputError(
             path, "has a header but no rows" if names else "has no rows", "record again, or check the export"
         )
-    _refuse_ragged(path, names, lines, delimiter)
-    return _table(str(path), names, [line for _, line in lines], delimiter, np.array([i for i, _ in lines]))
-
-
-def table_of_text(path: Path, options: Mapping[str, Any]) -> Table:
-    """A delimited file as a table, for what is proposed of it. Takes what readers take."""
-    return read_table(path)
-
-
-def _delimiter(first: str, row: str) -> str | None:
-    """The separator of a row of data, or None for runs of blanks and tabs.
-
-    A cell may hold blanks (a date and its time) where the file's first row has as many cells and no number among them.
-    """
-    for candidate in (";", ",", "\t"):
-        named = first.count(candidate) == row.count(candidate) and not _is_numeric(first, candidate)
-        if candidate in row and (named or not any(len(cell.split()) > 1 for cell in row.split(candidate))):
-            return candidate
-    return None
-
-
-def _split(line: str, delimiter: str | None) -> list[str]:
-    return line.split(delimiter)
-
-
-def _looks_like_header(lines: list[tuple[int, str]], delimiter: str | None) -> bool:
-    """Whether a commented row names the columns of the row after it ("%time,x,y" of a topic's export)."""
-    names = _split(lines[0][1].lstrip("#% "), delimiter)
-    following = next((line for _, line in lines[1:] if line[0] not in "#%"), "")
-    same = len(names) == len(_split(following, delimiter)) if following else len(names) > 1
-    return same and not _is_numeric(lines[0][1].lstrip("#% "), delimiter)
-
-
-def _is_numeric(line: str, delimiter: str | None) -> bool:
-    """Whether a row is data: at least one field of it is a number."""
-    return any(_number(field) is not None for field in _split(line, delimiter))
-
-
-def _number(field: str) -> float | None:
-    """The number in a cell, perhaps in quotes. What only Python calls one (1_000, other scripts' digits) is none."""
-    field = field.strip().strip('"')
-    try:
-        return float(field) if field.isascii() and "_" not in field else None
-    except ValueError:
-        return None
-
-
-def _refuse_ragged(path: Path, names: list[str], lines: list[tuple[int, str]], delimiter: str | None) -> None:
     width = len(names) or len(_split(lines[0][1], delimiter))
     for row, line in lines:
         count = line.count(delimiter) + 1 if delimiter else len(line.split())
@@ -156,10 +132,74 @@ def _refuse_ragged(path: Path, names: list[str], lines: list[tuple[int, str]], d
                 f"{path}: row {row}", f"has {count} values, {reference} has {width}",
                 "rows must be of one length; remove or fix that row (a last row like this is a truncated file)",
             )  # fmt: skip
+    return _table(str(path), names, [line for _, line in lines], delimiter, np.array([i for i, _ in lines]))
+
+
+def table_of_text(path: Path, options: Mapping[str, Any]) -> Table:
+    """A delimited file as a table, for a proposal of settings. Arguments as for readers."""
+    return read_table(path)
+
+
+def _delimiter(first: str, row: str) -> str | None:
+    """The separator of a row of data, or None for blanks and tabs.
+
+    A cell may hold blanks (a date and its time) if the file's first row has as many cells and no number among them.
+    """
+    for candidate in (";", ",", "\t"):
+        named = first.count(candidate) == row.count(candidate) and not _is_numeric(first, candidate)
+        if candidate in row and (named or not any(len(cell.split()) > 1 for cell in row.split(candidate))):
+            return candidate
+    return None
+
+
+def _is_data(line: str, delimiter: str | None) -> bool:
+    return any(BEGINS.match(field) for field in _split(line, delimiter))
+
+
+def _preamble(lines: list[tuple[int, str]], delimiter: str | None) -> int:
+    """Number of rows above a header, which are shorter: version, name, or groups of columns."""
+    counts = [len(_split(line, delimiter)) for _, line in lines[: MOST_ABOVE + 2]]
+    first = counts.index(counts[-1])
+    header = not _is_data(lines[first][1], delimiter) and set(counts[first:]) == {counts[-1]}
+    more = header and len(counts) > first + 1
+    return first if more and any(_is_data(line, delimiter) for _, line in lines[first + 1 :]) else 0
+
+
+def _more_names(lines: list[tuple[int, str]], delimiter: str | None, width: int) -> int:
+    """Number of rows below a header that belong to it: axes below bodies, units below names."""
+    for count, (_, line) in enumerate(lines):
+        if _is_data(line, delimiter) or len(_split(line, delimiter)) != width or count > 3:
+            return count if count <= 3 and _is_data(line, delimiter) else 0
+    return 0
+
+
+def _split(line: str, delimiter: str | None) -> list[str]:
+    return line.split(delimiter)
+
+
+def _looks_like_header(lines: list[tuple[int, str]], delimiter: str | None) -> bool:
+    """Whether a commented row names the columns of the next row ("%time,x,y" of a topic's export)."""
+    names = _split(lines[0][1].lstrip("#% "), delimiter)
+    following = next((line for _, line in lines[1:] if line[0] not in "#%"), "")
+    same = len(names) == len(_split(following, delimiter)) if following else len(names) > 1
+    return same and not _is_numeric(lines[0][1].lstrip("#% "), delimiter)
+
+
+def _is_numeric(line: str, delimiter: str | None) -> bool:
+    return any(_number(field) is not None for field in _split(line, delimiter))
+
+
+def _number(field: str) -> float | None:
+    """The number in a cell, perhaps in quotes. Notation of Python alone (1_000, digits of other scripts) is none."""
+    field = field.strip().strip('"')
+    try:
+        return float(field) if field.isascii() and "_" not in field else None
+    except ValueError:
+        return None
 
 
 def _table(source: str, names: list[str], lines: list[str], delimiter: str | None, rows: NDArray[np.int64]) -> Table:
-    """The numbers, and which columns hold words: numpy's own parser first, column by column where it fails."""
+    """Parse rows by numpy, or column by column if that fails."""
     if all(line.isascii() and "_" not in line for line in lines):
         try:
             return Table(
@@ -176,8 +216,10 @@ def _table(source: str, names: list[str], lines: list[str], delimiter: str | Non
         cells = _with_points(source, cells, rows)
     values, text = np.empty((len(lines), len(cells))), dict[int, tuple[int, str]]()
     for j, column in enumerate(cells):
-        values[:, j], word = _column_of(column)
-        if word is not None:
+        numbers = [_number(cell) if cell else np.nan for cell in column]
+        values[:, j] = [np.nan if number is None else number for number in numbers]
+        if None in numbers:
+            word = numbers.index(None)
             text[j] = (int(rows[word]), column[word])
     stamps = {j: found for j in text if (found := seconds(cells[j])) is not None}
     blank = np.array([[not cell for cell in column] for column in cells]).T
@@ -187,15 +229,8 @@ def _table(source: str, names: list[str], lines: list[str], delimiter: str | Non
     )  # fmt: skip
 
 
-def _column_of(cells: Sequence[str]) -> tuple[Float, int | None]:
-    """Numbers of one column, NaN where there is none, and the first cell that holds a word."""
-    found = [_number(cell) if cell else np.nan for cell in cells]
-    word = next((i for i, number in enumerate(found) if number is None), None)
-    return np.array([np.nan if number is None else number for number in found]), word
-
-
 def _with_points(source: str, cells: list[list[str]], rows: NDArray[np.int64]) -> list[list[str]]:
-    """Columns of cells whose decimal commas are points.
+    """Columns of cells with decimal commas replaced by points.
 
     Raises:
         InputError: the file has numbers with commas and others with points.
@@ -214,3 +249,48 @@ def _with_points(source: str, cells: list[list[str]], rows: NDArray[np.int64]) -
         [cell.replace(",", ".") if comma else cell for cell, comma in zip(column, which, strict=True)]
         for column, which in zip(cells, commas, strict=True)
     ]
+
+
+BETWEEN, CLOCK = r" ?[Tt /_,-] ?", r"(\d\d?):(\d\d)(?::(\d\d)([.,:]\d+)?)?"
+ZONE = r" ?([Zz]|UTC|GMT|[-+]\d\d(?::?\d\d)?)?"
+DATE = re.compile(rf"(\d{{4}})([-/._])(\d\d?)\2(\d\d?){BETWEEN}{CLOCK}{ZONE}")
+BASIC = re.compile(rf"(\d{{4}})()(\d\d)(\d\d)[Tt _-](\d\d)(\d\d)(\d\d)([.,]\d+)?{ZONE}")
+DAY_FIRST = re.compile(rf"(\d\d?)\.(\d\d?)\.(\d{{4}}){BETWEEN}{CLOCK}")
+TIME = re.compile(CLOCK)
+
+
+def seconds(cells: Sequence[str]) -> Float | None:
+    """Seconds (T,) of dates or times of day, one per cell. None if one of them is neither, or no valid date."""
+    try:
+        found = [_second(cell) for cell in cells]
+    except ValueError:
+        return None
+    time = np.array([second for second, _ in found])
+    if any(dated for _, dated in found):
+        return time if all(dated for _, dated in found) else None
+    return time + 86400.0 * np.concatenate([[0.0], np.cumsum(np.diff(time) < -86400.0 / 2.0)])
+
+
+def _second(cell: str) -> tuple[float, bool]:
+    """Seconds of one cell, and whether it has a date. Raises `ValueError` if it is neither."""
+    if match := DATE.fullmatch(cell) or BASIC.fullmatch(cell):
+        year, _, month, day, hour, minute, second, part, zone = match.groups()
+    elif match := DAY_FIRST.fullmatch(cell):
+        (day, month, year, hour, minute, second, part), zone = match.groups(), None
+    elif (match := TIME.fullmatch(cell)) and match[3]:
+        return 3600.0 * int(match[1]) + 60.0 * int(match[2]) + int(match[3]) + _part(match[4]), False
+    else:
+        raise ValueError(cell)
+    date = datetime(int(year), int(month), int(day), int(hour), int(minute), int(second or 0), tzinfo=UTC)
+    return date.timestamp() - _east(zone or "") + _part(part), True
+
+
+def _east(zone: str) -> float:
+    digits = zone[1:].replace(":", "") if zone[:1] in ("+", "-") else ""
+    if not digits:
+        return 0.0
+    return (-60.0 if zone[0] == "-" else 60.0) * (60 * int(digits[:2]) + int(digits[2:] or 0))
+
+
+def _part(text: str | None) -> float:
+    return float(f".{text[1:]}") if text else 0.0

@@ -1,1 +1,1 @@
-"""A skill as a file: how it is named, read, written and exported."""
+"""Skill files: naming, reading, writing and exporting."""

@@ -1,1 +1,1 @@
-"""A run: the loop, what stands in it, and what it leaves behind."""
+"""The simulation loop, its drives and its results."""

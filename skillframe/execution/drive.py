@@ -1,39 +1,47 @@
-"""`Drive`: what stands between a command and the plant, as the one loop sees it.
+"""`Drive`: interface between the simulation loop and a robot's sensors, actuators and plant.
 
     prepare -> (sense -> [skill] -> act -> violations -> advance) each tick
 
-The loop knows neither arms nor oil. A drive reads its sensors, turns a command into what its actuators take, holds its
-own limits, and moves the plant by a tick. `skillframe.execution.drives` has those that ship: ideal joint torques,
-several arms, electric servos as FMUs, a hydraulic machine.
+A drive reads its sensors, turns commands into actuator inputs, checks its limits, and steps the plant. The core's
+drives are in `skillframe.execution.drives`; plug-ins add others.
+
+`PacedSkill` runs a skill at an arm's command rate, on a clock slowed to the arm's speed: position-controlled arms
+cannot push at the demonstrated speed (`skillframe.robot.interface`). A second of the skill takes `pace` seconds: it
+sees times divided by the pace and twists multiplied by it; the caller divides its twists.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.control.endings import Broken
 from skillframe.execution.result import Result
 from skillframe.execution.trace import Trace
+from skillframe.extend.records import DriveType
 from skillframe.frames import Float
-from skillframe.skill import Command, Observation
+from skillframe.robot.model import RobotModel
+from skillframe.robot.spec import Limits
+from skillframe.skill import Broken, Command, Observation, Skill
 from skillframe.world.plant import Plant
+from skillframe.world.quantities import SensorSettings
+from skillframe.world.scene import Scene, State
 
 Trials = NDArray[np.int64]
 
 
 class Shares(NamedTuple):
-    """What N trials took of their actuators so far.
+    """Actuator use of N trials so far. Shares are NaN where no limit is given, None where a drive has none.
 
     Attributes:
         energy: (N,) work of the controller on the tool [J].
-        torque: (N,) of the worst joint: what the law asked for, over the joint's effort; NaN where none is given.
-        speed: (N,) of the worst joint: its speed over its velocity limit; NaN where none is given.
-        range: (N,) of the worst joint: its distance from the middle of its range over half the range; NaN where none
-            is given, None where a drive does not tell.
-        joints: (3, N) names of the worst joints of torque, speed and range; None where a drive does not tell.
+        torque: (N,) commanded torque over effort of the worst joint.
+        speed: (N,) speed over velocity limit of the worst joint.
+        range: (N,) distance from the middle of the range over half of it, of the worst joint.
+        joints: (3, N) names of these joints.
     """
 
     energy: Float
@@ -44,27 +52,27 @@ class Shares(NamedTuple):
 
 
 class TrialRecorder(Protocol):
-    """What a drive's trials leave behind. `skillframe.execution.recorder.Recorder` is the plain one."""
+    """Records the trials of a drive. `skillframe.execution.recorder.Recorder` is the default."""
 
     def record(self, tick: int, time: float, observation: Observation, command: Command, law: Float) -> None:
-        """Take a sample if one is due at this tick."""
+        """Record a sample if one is due at this tick."""
 
     def close(self, rows: Trials) -> None:
-        """Mark trials as ended now."""
+        """Mark trials as ended."""
 
     def trace(self, i: int, meta: dict[str, Any]) -> Trace:
-        """The trace of trial i, with its metadata."""
+        """The trace of trial i with its metadata."""
 
 
 class Drive(Protocol):
-    """Sensors and actuators of N trials. Trials are independent of each other, to the last bit.
+    """Sensors and actuators of N trials, whose results are independent to the last bit.
 
-    Where a drive steers several arms, observations, commands and the law's wrench are (N, arms, ...), else (N, ...).
+    Observations, commands and wrenches are (N, arms, ...) for several arms, else (N, ...).
 
     Attributes:
         plant: the simulated robots in their world.
         dt: [s] between two ticks.
-        actuators: names of the joints that have an actuator of their own in the simulation; none for ideal torques.
+        actuators: names of joints with a simulated actuator; empty for ideal torques.
     """
 
     plant: Plant
@@ -72,39 +80,119 @@ class Drive(Protocol):
     actuators: tuple[str, ...]
 
     def prepare(self) -> list[Broken]:
-        """Before the skill starts: tare, or identify. Trials that cannot run, each with the cause in words."""
+        """Tare or identify before the skill starts. Returns trials that cannot run, with the cause."""
 
     def sense(self, tick: int, active: Trials) -> Observation:
-        """Read the sensors of the trials that still run. The other rows may hold anything finite or not."""
+        """Read the sensors of the active trials. Other rows may hold anything."""
 
     def act(self, command: Command, ramp: float) -> Float:
-        """Take in a command. The wrench (N, 6) that the law puts on the tool at the centre of compliance.
+        """Apply a command and return the controller's wrench (N, 6) on the tool at the centre of compliance.
 
-        Args:
-            command: what the skill wants.
-            ramp: 0 ... 1 fades desired twist and feed-forward in, so that a start is bumpless.
+        `ramp`, 0 to 1, scales desired twist and feed-forward for a smooth start.
         """
 
     def violations(self, tick: int, active: Trials) -> list[Broken]:
         """Trials among `active` that broke a limit in this tick."""
 
     def advance(self, active: Trials) -> list[Broken]:
-        """Move the plant by a tick. Trials whose actuators failed, each with a sentence that needs no time added."""
+        """Step the plant. Returns trials whose actuators failed, with a complete sentence."""
 
     def end(self, rows: Trials) -> None:
-        """Trials end now, as they stand."""
+        """End trials in their current state."""
 
     def contact_torque(self) -> Float:
-        """(N,) size of the true contact torque at the centre of compliance [Nm]."""
+        """Size of the true contact torque at the centre of compliance (N,) [Nm]."""
 
     def shares(self) -> Shares:
-        """What the trials took of their actuators so far."""
+        """Actuator use of the trials so far."""
 
     def notes(self, i: int) -> list[str]:
-        """Sentences about what trial i's result holds and leaves out."""
+        """Sentences on assumptions and gaps of trial i's result."""
 
     def recording(self, every: int) -> TrialRecorder:
-        """What records the batch, a sample every `every` ticks."""
+        """A recorder with a sample every `every` ticks."""
 
     def outcome(self, result: Result) -> Result:
-        """The batch's result, with what this kind of drive has to add."""
+        """The batch's result, with what this drive adds."""
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setup:
+    """Robot, task and settings shared by the trials of a batch.
+
+    Attributes:
+        robot: the nominal robot.
+        scene: the task.
+        center_of_compliance: (3,) point of the tool frame that the skill controls; (arms, 3) for several arms.
+        sensors: noise of the sensors.
+        filter_wrench: False passes the raw wrench to skill and limits.
+        drive: replaces the robot's own drive.
+        skill_speed: of the skill in contact, where known [m/s].
+        stop_when: ends a trial as done, checked every 10 ms; None leaves the end to the skill.
+        attempts_at: number of each trial's attempted goal. When `stop_when` finds a goal reached, later attempts at it
+            end as interrupted. None runs all trials.
+    """
+
+    robot: RobotModel
+    scene: Scene
+    center_of_compliance: Float = field(default_factory=lambda: np.zeros(3))
+    sensors: SensorSettings = field(default_factory=SensorSettings)
+    filter_wrench: bool = True
+    drive: DriveType | None = None
+    skill_speed: float | None = None
+    stop_when: Callable[[State], NDArray[np.bool_]] | None = None
+    attempts_at: tuple[int, ...] | None = None
+
+    @property
+    def pace(self) -> float:
+        """Seconds that a second of the skill takes on this robot, 1 or more."""
+        return self.robot.spec.control.pace(self.skill_speed)
+
+    @property
+    def limits(self) -> Limits:
+        """The robot's limits, with a torque rate only for torque-controlled joints."""
+        spec = self.robot.spec
+        told = spec.base != "free" and spec.control.interface == "torque"
+        return spec.limits if told else replace(spec.limits, torque_rate_nm_s=None)
+
+
+class PacedSkill(Skill):
+    """A skill with a new command every `every` ticks, whose second takes `pace` >= 1 seconds."""
+
+    def __init__(self, skill: Skill, every: int, pace: float) -> None:
+        self._skill, self._every, self._pace = skill, every, pace
+        self._tick = 0
+        self._command: Command | None = None
+
+    def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
+        """Start the skill and the tick count."""
+        self._tick, self._command = 0, None
+        self._skill.start(self._seen(observation), rngs)
+
+    def step(self, observation: Observation) -> Command:
+        """A new command if one is due, else the last one."""
+        if self._command is None or self._tick % self._every == 0:
+            self._command = self._skill.step(self._seen(observation))
+        self._tick += 1
+        return self._command
+
+    def between(self) -> Command | None:
+        """The last command, or None if a new one is due."""
+        if self._command is None or self._tick % self._every == 0:
+            return None
+        self._tick += 1
+        return self._command
+
+    def restart(
+        self, rows: NDArray[np.intp], observation: Observation, rngs: Sequence[np.random.Generator]
+    ) -> None:  # fmt: skip
+        """Restart rows of the skill."""
+        self._skill.restart(rows, self._seen(observation), rngs)
+
+    def journal(self, trial: int) -> list[tuple[float, str]]:
+        """The skill's log, in seconds of the run."""
+        return [(self._pace * time, text) for time, text in self._skill.journal(trial)]
+
+    def _seen(self, observation: Observation) -> Observation:
+        twist, time = self._pace * observation.twist, observation.time / self._pace
+        return Observation(time, self._every * observation.dt / self._pace, observation.pose, twist, observation.wrench)

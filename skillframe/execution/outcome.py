@@ -1,7 +1,7 @@
-"""What became of each trial of a batch: judged as it ended, and told as a `Result` and in its trace's metadata.
+"""Outcome of each trial of a batch, as a `Result` and in its trace's metadata.
 
-A trial is a success if the scene's goal holds as it ends, no limit was broken, and its skill did not say that it
-failed. Whether the skill had ended by itself stands beside it (`ended_itself`).
+A trial succeeds if the scene's goal holds at its end, no limit was broken, and its skill did not report failure. The
+goal is the scene's before the skill started. A goal that holds although its own error has grown much is no success.
 """
 
 from __future__ import annotations
@@ -15,34 +15,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.control.contact import TrueContact, over
-from skillframe.control.endings import Ended
-from skillframe.execution.drive import Drive, TrialRecorder
+from skillframe.execution.drive import Drive, Setup, TrialRecorder
 from skillframe.execution.result import Result
-from skillframe.execution.setup import Setup
-from skillframe.execution.tracemeta import SHARE_JOINTS, SHARES
+from skillframe.execution.trace import SHARE_JOINTS, SHARES
 from skillframe.frames import Float
-from skillframe.skill import Status, no_reasons
+from skillframe.skill import Ended, Status, no_reasons
 from skillframe.world.collisions import Collisions
 
+MUCH = (0.01, np.deg2rad(10.0))
+"""Allowed growth of an error until a goal is reached [m, rad].
+
+A goal has a width, and some ignore a direction in their error. All shipped goals are narrower.
+"""
 Journal = Callable[[int], list[tuple[float, str]]]
 
 
 class Outcomes:
-    """Figures of N trials, each taken as its trial ends.
-
-    Args:
-        setup: robot, scene and settings.
-        drive: asked for shares and notes.
-        contact: true contact of the trials, and what the estimate read.
-        count: N.
+    """Outcome figures of N trials, each taken as its trial ends.
 
     Attributes:
         status: (N,) of the skill (`Status`), set before a trial is closed.
-        touched: of each trial that ended by it, the names of both bodies.
+        touched: names of both bodies, for trials that ended by collision.
     """
 
     def __init__(self, setup: Setup, drive: Drive, contact: TrueContact, count: int) -> None:
         self.setup, self.drive, self.contact, self.count = setup, drive, contact, count
+        self._goal, self._goal_error, self._way = setup.scene.goal, setup.scene.goal_error, setup.scene.way
+        self._before = np.stack(self._goal_error(drive.plant.tip_state()), axis=-1)
         self.touched: dict[int, tuple[str, str]] = {}
         self.reason, self.status = no_reasons(count), np.zeros(count, dtype=np.int64)
         self.limited = np.zeros(count, dtype=bool)
@@ -54,22 +53,14 @@ class Outcomes:
         self.goal, self.errors, self.energy = np.zeros(count, dtype=bool), np.zeros((count, 2)), np.zeros(count)
 
     def close(self, rows: NDArray[np.int64], time: float, reason: str, code: Ended, limit: bool) -> None:
-        """Judge trials that end now by the scene's goal as they stand.
-
-        Args:
-            rows: of the trials.
-            time: since the start [s].
-            reason: in words.
-            code: what ended them.
-            limit: that was a limit or a fault.
-        """
+        """Evaluate ending trials `rows` at `time` [s]. `limit` marks a broken limit or a fault."""
         state = self.drive.plant.tip_state()
-        self.goal[rows] = self.setup.scene.goal(state)[rows]
-        self.errors[rows] = np.stack(self.setup.scene.goal_error(state), axis=-1)[rows]
+        self.goal[rows] = self._goal(state)[rows]
+        self.errors[rows] = np.stack(self._goal_error(state), axis=-1)[rows]
         for name, value in state.second.items():
             self.second.setdefault(name, np.full(self.count, np.nan))[rows] = value[rows]
-        if self.setup.scene.way is not None:
-            self.way[rows] = self.setup.scene.way.reached(state)[rows]
+        if self._way is not None:
+            self.way[rows] = self._way.reached(state)[rows]
         self.duration[rows], self.limited[rows] = time, limit
         shares = self.drive.shares()
         self.energy[rows] = shares.energy[rows]
@@ -87,15 +78,8 @@ class Outcomes:
     def result(
         self, recorder: TrialRecorder | None, journal: Journal, collisions: Collisions, interrupted: bool
     ) -> Result:
-        """The outcome of every trial.
-
-        Args:
-            recorder: what holds the traces, or None.
-            journal: what the skill notes of a trial.
-            collisions: how far bodies were apart, and what there is to say of that.
-            interrupted: Ctrl-C came before the end.
-        """
-        success = self.goal & ~self.limited & (self.status != Status.FAILURE)
+        """The outcome of every trial, with `journal` for a trial's log and `interrupted` for Ctrl-C."""
+        success = self.goal & ~self.limited & (self.status != Status.FAILURE) & ~self._contradicted()
         failure = no_reasons(self.count)
         for i in np.flatnonzero(~success):
             failure[i] = self._failure(int(i))
@@ -115,20 +99,27 @@ class Outcomes:
             second=self.second, traces=traces, interrupted=interrupted,
         )  # fmt: skip
 
+    def _contradicted(self) -> NDArray[np.bool_]:
+        """Whether the goal holds (N,) although neither error has shrunk since the start and one has grown much."""
+        grown = self.errors - self._before
+        result: NDArray[np.bool_] = self.goal & np.all(grown >= 0.0, axis=1) & np.any(grown > MUCH, axis=1)
+        return result
+
     def _failure(self, i: int) -> str:
-        """Why trial i is no success, in words."""
         if self.limited[i]:
             return str(self.reason[i])
+        if self._contradicted()[i]:
+            now, before = (
+                f"{1e3 * error[0]:.3g} mm and {error[1]:.3g} rad" for error in (self.errors[i], self._before[i])
+            )
+            return f"contradiction: the goal criterion holds {now} from the goal, and the start was {before} from it"
         lacks = "the skill gave up, though the goal is reached" if self.goal[i] else "goal not reached"
         return f"{lacks}: {self.reason[i]}"
 
-    def _notes(self, i: int, success: bool, note: str) -> list[str]:
-        """Sentences about what a result holds and leaves out."""
-        mark = over(float(self.contact.peak[i]), self.setup.robot.spec.limits.force_n) if success else ""
-        return [*(text for text in (mark, note) if text), *self.drive.notes(i)]
-
     def _meta(self, i: int, success: bool, failure: str, *, journal: Journal, collisions: Collisions) -> dict[str, Any]:
         scene, actuators = self.setup.scene, list(self.drive.actuators)
+        peak = float(self.contact.peak[i])
+        mark = over(peak, self.setup.robot.spec.limits.force_n) if success else ""
         return {
             "robot": self.setup.robot.spec.name, "world": scene.name, "params": scene.params,
             "interface": self.setup.robot.spec.control.figures(),
@@ -136,13 +127,14 @@ class Outcomes:
             "frames": {k: list(v) for k, v in scene.tool.frames.items()},
             "hand": scene.tool.hand, "success": success, "failure": failure, "reason": str(self.reason[i]),
             "status": Status(int(self.status[i])).name, "duration_s": float(self.duration[i]),
-            "peak_force_n": float(self.contact.peak[i]), "peak_force_filtered_n": float(self.filtered[i]),
+            "peak_force_n": peak, "peak_force_filtered_n": float(self.filtered[i]),
             "peak_force_10ms_n": float(self.contact.mean[i]), "ended_by": self.ended_by[i],
             **{name: _known(share) for name, share in zip(SHARES, self.shares[:, i], strict=True)},
             **dict(zip(SHARE_JOINTS, self.joints[:, i], strict=True)),
             "goal_reached": bool(self.goal[i]), "ended_itself": self.ended_by[i] == Ended.SKILL,
             "distance_to_collision_m": _known(float(collisions.distance[i])),
-            "notes": self._notes(i, success, collisions.note), "final_error_m": float(self.errors[i, 0]),
+            "notes": [*(text for text in (mark, collisions.note) if text), *self.drive.notes(i)],
+            "final_error_m": float(self.errors[i, 0]),
             "final_error_rad": float(self.errors[i, 1]), "analytic": scene.analytic,
             "progress": None if scene.way is None else scene.way.told(_known(self.way[i])),
             "events": [[time, text] for time, text in journal(i)],
@@ -153,5 +145,4 @@ class Outcomes:
 
 
 def _known(figure: float) -> float | None:
-    """A figure for a file. None where there is none."""
     return None if np.isnan(figure) else float(figure)

@@ -1,1 +1,1 @@
-"""What exists: hooks, the records that plug-ins yield, and the registry that gathers them."""
+"""Hooks, the records that plug-ins yield, and the registry that collects them."""

@@ -1,4 +1,4 @@
-"""Commands that plug-ins add to `skillframe`: found by their metadata, imported when they are used.
+"""Commands that plug-ins add to `skillframe`: found by their metadata, imported on use.
 
 An entry point in the group `skillframe.commands` names a click command, or a `LazyCommand`, which names its module::
 
@@ -7,36 +7,36 @@ An entry point in the group `skillframe.commands` names a click command, or a `L
 
     my_command = LazyCommand("Does what I need.", "skillframe_my_plugin.command:command")
 
-`skillframe --help` imports what the entry point names for its line of summary, so that module imports nothing heavy.
-`SKILLFRAME_PLUGINS` leaves out a command together with the plug-ins of its distribution.
+`skillframe --help` imports the entry point's module for the summary, so that module should import nothing heavy.
+`SKILLFRAME_PLUGINS` selects a command together with the plug-ins of its distribution.
 """
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import redirect_stdout
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from skillframe.errors import SkillframeError
 from skillframe.extend.contract import GROUP as PLUGINS
-from skillframe.extend.metadata import EntryPoint, declaring
+from skillframe.extend.isolated import isolated
+from skillframe.extend.metadata import declaring
 
 if TYPE_CHECKING:
     import click
 
 GROUP = "skillframe.commands"
-SUMMARY_WIDTH = 80
 
 
 class BadCommand(SkillframeError):
-    """A command of a plug-in that cannot be used. Says whose and why."""
+    """A command of a plug-in cannot be used."""
 
 
 class LazyCommand:
-    """A command that is imported when it is used, and not for its line of summary.
+    """A command that is imported on use, but not for its summary.
 
     Attributes:
         summary: one line for listings.
@@ -49,15 +49,19 @@ class LazyCommand:
         self.summary, self.place = summary, place
 
 
+class Left(SkillframeError):
+    """A command's module raised `SystemExit`, `KeyboardInterrupt` or the like on import."""
+
+
 class PluginCommand:
-    """A command as its distribution's metadata declares it.
+    """A command as declared in its distribution's metadata.
 
     Attributes:
-        name: what is typed after `skillframe`.
+        name: as typed after `skillframe`.
         distributions: names of those that bring it; one, unless several bring the same name.
         version: of the first.
-        selected: False where `SKILLFRAME_PLUGINS` leaves out every plug-in of the distribution.
-        place: where the command is, "package.module:name"; "" if several distributions bring the name.
+        selected: False if `SKILLFRAME_PLUGINS` leaves out every plug-in of the distribution.
+        place: of the command, "package.module:name"; "" if several distributions bring the name.
     """
 
     def __init__(self, name: str, distributions: tuple[str, ...], version: str, selected: bool, place: str) -> None:
@@ -65,18 +69,18 @@ class PluginCommand:
         self.selected, self.place = selected, place
 
     def summary(self) -> str:
-        """Its line in a listing, or what is wrong with it."""
+        """Its line in a listing, or its error."""
         try:
             found = self._named(self.place)
-            return found.summary if isinstance(found, LazyCommand) else self.load().get_short_help_str(SUMMARY_WIDTH)
+            return found.summary if isinstance(found, LazyCommand) else self.load().get_short_help_str(80)
         except BadCommand as error:
             return str(error)
 
     def load(self) -> click.Command:
-        """The command, its module imported now. What the module prints goes to stderr.
+        """Import the command. What its module prints goes to stderr.
 
         Raises:
-            BadCommand: several distributions bring it, it cannot be imported, or is no click command.
+            BadCommand: several distributions bring it, it cannot be imported, or it is no click command.
         """
         import click
 
@@ -88,20 +92,20 @@ class PluginCommand:
         return found
 
     def _named(self, place: str) -> Any:
-        """What stands at "package.module:name"."""
         if len(self.distributions) > 1:
             rivals = " and ".join(self.distributions)
             raise BadCommand(f"the command {self.name} is in {rivals}; uninstall all but one")
         module, _, attribute = place.partition("[")[0].partition(":")
         try:
-            with redirect_stdout(sys.stderr):
+            with redirect_stdout(sys.stderr), isolated(Left):
                 found: Any = import_module(module.strip())
                 for part in filter(None, attribute.strip().split(".")):
                     found = getattr(found, part)
-        except (Exception, SystemExit) as error:  # one plug-in must not take the rest down
+        except Exception as error:  # a plug-in's error must not stop the others
             if os.environ.get("SKILLFRAME_STRICT_PLUGINS") == "1":
                 raise
-            raise self._bad(f"cannot be loaded ({type(error).__name__}: {error})") from error
+            said = str(error) if isinstance(error, Left) else f"{type(error).__name__}: {error}"
+            raise self._bad(f"cannot be loaded ({said})") from error
         return found
 
     def _bad(self, problem: str) -> BadCommand:
@@ -111,7 +115,7 @@ class PluginCommand:
 
 
 def plugin_commands() -> dict[str, PluginCommand]:
-    """Every command of an installed distribution by name, in alphabetical order. Nothing is imported."""
+    """Commands of all installed distributions, by name in alphabetical order, without importing them."""
     found: dict[str, PluginCommand] = {}
     for command in _declared():
         other = found.get(command.name)
@@ -125,14 +129,10 @@ def plugin_commands() -> dict[str, PluginCommand]:
 
 def _declared() -> Iterator[PluginCommand]:
     for distribution, version, points in declaring(GROUP):
-        selected = _is_selected(points)
+        setting = os.environ.get("SKILLFRAME_PLUGINS")
+        selected = setting is None or any(
+            group == PLUGINS and name in {each.strip() for each in setting.split(",")} for group, name, _ in points
+        )
         for group, name, place in points:
             if group == GROUP:
                 yield PluginCommand(name, (distribution,), version, selected, place)
-
-
-def _is_selected(points: Sequence[EntryPoint]) -> bool:
-    setting = os.environ.get("SKILLFRAME_PLUGINS")
-    return setting is None or any(
-        group == PLUGINS and name in {each.strip() for each in setting.split(",")} for group, name, _ in points
-    )

@@ -1,11 +1,9 @@
-"""The version of the plug-in contract, and the window of versions that this skillframe serves.
+"""The version of the plug-in contract, and the versions that this skillframe supports.
 
-The contract is what a plug-in and the core rely on: hooks, records, observations and commands. Its version is that of
-the first skillframe that has it. A plug-in says which one it was written for, by `skillframe_contract = "0.2"` in its
-entry module, or by `contract` of a record. One that says nothing was written before it could: 0.1.
-
-A plug-in out of the window is not loaded, and neither is one whose distribution asks for another skillframe: what a
-skill is told and what is done with its commands could differ from what its author meant (our choice).
+The contract covers hooks, records, observations and commands. Its version is that of the first skillframe that has it.
+A plug-in states its contract by `skillframe_contract = "0.2"` in its entry module, or by `contract` of a record;
+without a statement it is 0.1. A plug-in of an unsupported contract, or whose distribution requires another skillframe,
+is not loaded, since a skill's observations and commands could differ from what its author meant.
 """
 
 from __future__ import annotations
@@ -14,19 +12,19 @@ import re
 from collections.abc import Iterable
 
 GROUP = "skillframe"
-"""Entry points of plug-ins."""
+"""Group of the entry points of plug-ins."""
 CONTRACT = "0.2"
-"""Of this skillframe."""
+"""Contract of this skillframe."""
 OLDEST = "0.1"
-"""The oldest one that is still served: the minor version before."""
+"""The oldest supported contract: the previous minor version."""
 ATTRIBUTE = "skillframe_contract"
 
 
 def contract_problem(what: str, stated: object) -> str:
-    """A sentence if something was written for a contract that this skillframe does not serve, else "".
+    """A sentence if a stated contract is unsupported, otherwise "".
 
     Args:
-        what: what states it, as the sentence begins: "the plug-in", "skill 'slide'".
+        what: what states it, the beginning of the sentence: "the plug-in", "skill 'slide'".
         stated: the version, "0.2"; "" or None for none.
     """
     if stated in ("", None):
@@ -46,11 +44,11 @@ def _numbers(version: str) -> tuple[int, ...]:
 
 
 def requirement_problem(requires: Iterable[str], version: str) -> str:
-    """A sentence if a distribution asks for another skillframe than there is, else "".
+    """A sentence if a distribution requires another skillframe than the installed one, otherwise "".
 
     Args:
         requires: its requirements, as in its metadata.
-        version: of skillframe; what follows its numbers ("0.2.0.dev1") is left out of account.
+        version: of skillframe; suffixes ("0.2.0.dev1") are ignored.
     """
     asked = [text for text in requires if re.match(r"skillframe(?![\w.-])", text.strip(), re.IGNORECASE)]
     if not asked:
@@ -63,9 +61,9 @@ def requirement_problem(requires: Iterable[str], version: str) -> str:
         try:
             wanted = Requirement(text)
         except InvalidRequirement:
-            return f"its metadata asks for {text!r}, which is no requirement; install it again"
+            return f"its metadata requires {text!r}, which is no requirement; install it again"
         if wanted.marker is not None and not wanted.marker.evaluate({"extra": ""}):
             continue
         if here not in wanted.specifier:
-            return f"it asks for skillframe{wanted.specifier}, and {version} is installed; install versions that fit"
+            return f"it requires skillframe{wanted.specifier}, and {version} is installed; install versions that fit"
     return ""

@@ -1,4 +1,4 @@
-"""The hooks a plug-in can implement. Each yields records and runs once per process, never in the loop.
+"""The hooks that a plug-in can implement. Each yields records and runs once per process, never in the loop.
 
 A plug-in is a distribution with an entry point in the group `skillframe` that names a module::
 
@@ -20,16 +20,23 @@ import pluggy
 
 from skillframe.extend.contract import GROUP
 from skillframe.extend.records import (
+    AuditType,
     CoordinatorType,
     DriveType,
     ExporterType,
+    FolderType,
+    LinkType,
+    OutputType,
     ReaderType,
+    RequirementType,
     RobotType,
     RowType,
     ScoreType,
     SectionType,
     SegmenterType,
     SkillType,
+    TeacherType,
+    WorldFileType,
     WorldType,
 )  # fmt: skip
 
@@ -45,7 +52,7 @@ def skillframe_skills() -> Iterable[SkillType]:  # type: ignore[empty-body]
 
 @hookspec
 def skillframe_segmenters() -> Iterable[SegmenterType]:  # type: ignore[empty-body]
-    """Ways of cutting demonstrations into phases."""
+    """Methods that cut demonstrations into phases."""
 
 
 @hookspec
@@ -59,18 +66,33 @@ def skillframe_worlds() -> Iterable[WorldType]:  # type: ignore[empty-body]
 
 
 @hookspec
+def skillframe_world_files() -> Iterable[WorldFileType]:  # type: ignore[empty-body]
+    """Kinds of file that describe a world."""
+
+
+@hookspec
+def skillframe_teachers() -> Iterable[TeacherType]:  # type: ignore[empty-body]
+    """Simulated teachers, who demonstrate the task of a world."""
+
+
+@hookspec
 def skillframe_readers() -> Iterable[ReaderType]:  # type: ignore[empty-body]
     """Demonstration file formats."""
 
 
 @hookspec
+def skillframe_audits() -> Iterable[AuditType]:  # type: ignore[empty-body]
+    """Checks of demonstrations for suspicious data."""
+
+
+@hookspec
 def skillframe_rows() -> Iterable[RowType]:  # type: ignore[empty-body]
-    """Published results and how ours are computed: rows of `skillframe reproduce`, a command of skillframe-papers."""
+    """Published results and their computation: rows of `skillframe reproduce`, a command of skillframe-papers."""
 
 
 @hookspec
 def skillframe_exporters() -> Iterable[ExporterType]:  # type: ignore[empty-body]
-    """Formats of other controllers' settings: what `skillframe export --to` writes."""
+    """Settings formats of other controllers: what `skillframe export --to` writes."""
 
 
 @hookspec
@@ -85,9 +107,29 @@ def skillframe_robots() -> Iterable[RobotType]:  # type: ignore[empty-body]
 
 @hookspec
 def skillframe_drives() -> Iterable[DriveType]:  # type: ignore[empty-body]
-    """What stands between a skill's command and the plant."""
+    """Drives between a skill's command and the plant."""
+
+
+@hookspec
+def skillframe_links() -> Iterable[LinkType]:  # type: ignore[empty-body]
+    """Links to real robots, for `skillframe drive` of skillframe-drive."""
 
 
 @hookspec
 def skillframe_sections() -> Iterable[SectionType]:  # type: ignore[empty-body]
     """Sections of reports, made from a campaign's or a run's files alone."""
+
+
+@hookspec
+def skillframe_folders() -> Iterable[FolderType]:  # type: ignore[empty-body]
+    """Kinds of results folder whose report has a first page of its own."""
+
+
+@hookspec
+def skillframe_outputs() -> Iterable[OutputType]:  # type: ignore[empty-body]
+    """Kinds of file written of runs, skills, scenes and results, including options of `skillframe run`."""
+
+
+@hookspec
+def skillframe_requirements() -> Iterable[RequirementType]:  # type: ignore[empty-body]
+    """What a plug-in needs outside Python: lines of `skillframe doctor`."""

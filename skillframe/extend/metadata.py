@@ -1,7 +1,7 @@
-"""Metadata of installed distributions that mention a group of entry points, read without `importlib.metadata`.
+"""Metadata of installed distributions with a group of entry points, without `importlib.metadata`.
 
-Its import costs more than all else that `skillframe --help` does. Folders of the path are read here. Where Python finds
-distributions in anything else, such as a zip file or a finder of its own, `importlib.metadata` does it.
+Importing that would dominate the time of `skillframe --help`. It is used only where the path holds more than folders,
+such as zip files, or another finder.
 """
 
 from __future__ import annotations
@@ -13,14 +13,14 @@ from contextlib import suppress
 from importlib.machinery import PathFinder
 
 Read = Callable[[str], "str | None"]
-"""The text of a file of a distribution's metadata by name, or None."""
+"""Text of a file of a distribution's metadata by name, or None."""
 FOLDERS = (".dist-info", ".egg-info")
 
 
 EntryPoint = tuple[str, str, str]
 """A line of entry_points.txt: group, name, value."""
 Declared = tuple[str, str, list[EntryPoint]]
-"""A distribution that mentions a group: its name, version and entry points of every group."""
+"""A distribution with a group: its name, version and all entry points."""
 
 
 def search_path() -> Sequence[str]:
@@ -31,7 +31,7 @@ def search_path() -> Sequence[str]:
 def declaring(group: str) -> Iterator[Declared]:
     """Distributions whose entry points mention a group, in the order of the path.
 
-    The first of one name is the one that imports; the others, and those without a name, are left out.
+    Of several with one name only the first, which is the one that imports; none without a name.
     """
     seen: set[str] = set()
     for read in _distributions():
@@ -74,7 +74,7 @@ def _in_folder(place: str) -> Iterator[Read]:
 def _reader(folder: str) -> Read:
     def read(name: str) -> str | None:
         try:
-            with open(f"{folder}/{name}", "rb", buffering=0) as file:  # a third of the cost of text, a hundred times
+            with open(f"{folder}/{name}", "rb", buffering=0) as file:  # a third of the cost of text mode
                 return file.read().decode("utf-8", "replace").replace("\r\n", "\n")
         except OSError:
             return None
@@ -83,7 +83,7 @@ def _reader(folder: str) -> Read:
 
 
 def _head(text: str) -> dict[str, str]:
-    """The fields of a metadata file by name in small letters, up to its first empty line."""
+    """The fields of a metadata file by lower-case name, up to its first empty line."""
     lines = (line.partition(":") for line in text.partition("\n\n")[0].splitlines())
     return {key.strip().lower(): value.strip() for key, _, value in lines}
 

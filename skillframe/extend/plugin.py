@@ -1,67 +1,56 @@
-"""A plug-in as found, what it may provide, and what is wrong with what it gives."""
+"""A plug-in, its kinds of record, and checks of what it yields.
+
+Finds installed plug-ins: distributions with an entry point in the group, including damaged ones.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from importlib.metadata import Distribution, EntryPoint, distributions
 from typing import Any
 
 from skillframe.errors import SkillframeError, UnknownName
+from skillframe.extend import records
 from skillframe.extend.contract import GROUP
-from skillframe.extend.records import (
-    CoordinatorType,
-    DriveType,
-    ExporterType,
-    ReaderType,
-    RobotType,
-    RowType,
-    ScoreType,
-    SectionType,
-    SegmenterType,
-    SkillType,
-    WorldType,
-)  # fmt: skip
 
-KINDS: Mapping[str, str] = {
-    "skill": "skillframe_skills",
-    "segmenter": "skillframe_segmenters",
-    "coordinator": "skillframe_coordinators",
-    "world": "skillframe_worlds",
-    "reader": "skillframe_readers",
-    "row": "skillframe_rows",
-    "exporter": "skillframe_exporters",
-    "score": "skillframe_scores",
-    "robot": "skillframe_robots",
-    "drive": "skillframe_drives",
-    "section": "skillframe_sections",
-}
-"""Hook by kind of record."""
 RECORDS: Mapping[str, type[Any]] = {
-    "skill": SkillType,
-    "segmenter": SegmenterType,
-    "coordinator": CoordinatorType,
-    "world": WorldType,
-    "reader": ReaderType,
-    "row": RowType,
-    "exporter": ExporterType,
-    "score": ScoreType,
-    "robot": RobotType,
-    "drive": DriveType,
-    "section": SectionType,
+    "skill": records.SkillType,
+    "segmenter": records.SegmenterType,
+    "coordinator": records.CoordinatorType,
+    "world": records.WorldType,
+    "world_file": records.WorldFileType,
+    "teacher": records.TeacherType,
+    "reader": records.ReaderType,
+    "audit": records.AuditType,
+    "row": records.RowType,
+    "exporter": records.ExporterType,
+    "score": records.ScoreType,
+    "robot": records.RobotType,
+    "drive": records.DriveType,
+    "link": records.LinkType,
+    "section": records.SectionType,
+    "folder": records.FolderType,
+    "output": records.OutputType,
+    "requirement": records.RequirementType,
 }
+"""Type of the records of each kind."""
+KINDS: Mapping[str, str] = {kind: f"skillframe_{kind}s" for kind in RECORDS}
+"""Hook by kind of record."""
 
 
 @dataclass(slots=True, kw_only=True)
 class Plugin:
-    """One plug-in as found: where it comes from, what it provides, and its error if it has one.
+    """An installed plug-in: its origin, its records, and its error.
 
     Attributes:
         name: of the entry point.
-        distribution, version: what it was installed as.
-        requires: what the distribution depends on, as its metadata says.
+        distribution, version: it was installed as.
+        requires: requirements of the distribution.
         provides: "skill:slide" and so on.
-        error: what went wrong, in words; None if nothing did.
+        error: what went wrong, in words, or None.
     """
 
     name: str
@@ -72,7 +61,7 @@ class Plugin:
     error: str | None = None
 
     def fail(self, error: BaseException) -> None:
-        """Keep an error beside those it already has. With `SKILLFRAME_STRICT_PLUGINS=1` raise it instead."""
+        """Add an error. With `SKILLFRAME_STRICT_PLUGINS=1` raise it instead."""
         if os.environ.get("SKILLFRAME_STRICT_PLUGINS") == "1":
             raise error
         text = str(error) if isinstance(error, SkillframeError) else f"{type(error).__name__}: {error}"
@@ -80,15 +69,15 @@ class Plugin:
 
 
 class BadPlugin(SkillframeError):
-    """A plug-in's entry module breaks the rules of the hooks. Says which and how."""
+    """A plug-in's entry module breaks the rules of the hooks."""
 
 
 class OtherContract(SkillframeError):
-    """A plug-in, or one of its records, was written for another skillframe. Says which and what to do."""
+    """A plug-in, or one of its records, was written for another skillframe."""
 
 
 class PluginConflict(SkillframeError):
-    """Two plug-ins provide one name. Both are named."""
+    """Two plug-ins provide one name."""
 
     def __init__(self, kind: str, name: str, first: Plugin, second: Plugin) -> None:
         super().__init__(
@@ -98,7 +87,7 @@ class PluginConflict(SkillframeError):
 
 
 def hook_problems(module: object) -> Iterator[BadPlugin]:
-    """Hooks that would silently never be called: misspelt names, and hooks without the marker."""
+    """Hooks that would never be called: misspelt names, and hooks without the marker."""
     for name in dir(module):
         function = getattr(module, name, None)
         marker = getattr(function, f"{GROUP}_impl", None)
@@ -114,18 +103,77 @@ def hook_problems(module: object) -> Iterator[BadPlugin]:
 
 
 def checked(kind: str, answer: object) -> list[Any]:
-    """The records that a hook gave, or `BadPlugin` that says what is wrong with them."""
+    """The records that a hook yielded. Raises `BadPlugin` if one is invalid."""
     hook, expected = KINDS[kind], RECORDS[kind]
     if not hasattr(answer, "__iter__"):
         raise BadPlugin(f"{hook} gave {answer!r} instead of yielding {expected.__name__} records")
-    records: list[Any] = list(answer)
-    for record in records:
+    yielded: list[Any] = list(answer)
+    for record in yielded:
         if not isinstance(record, expected):
             raise BadPlugin(f"{hook} yielded {record!r}, not a {expected.__name__}")
         if not (isinstance(record.name, str) and record.name):
             raise BadPlugin(f"{hook} yielded a {expected.__name__} with the name {record.name!r}; give it a word")
-    names = [record.name for record in records]
+    names = [record.name for record in yielded]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise BadPlugin(f"{hook} yielded the name {', '.join(twice)} more than once")
-    return records
+    return yielded
+
+
+def installed() -> list[tuple[Plugin, Callable[[], object]]]:
+    """Installed plug-ins, each with its loader, by name. The loader of a damaged distribution raises its error.
+
+    Only distributions whose entry points mention the group are parsed.
+    """
+    found: dict[tuple[str, str], tuple[Plugin, Callable[[], object]]] = {}
+    seen: set[str] = set()
+    for distribution in distributions():
+        text = distribution.read_text("entry_points.txt") or ""
+        if not re.search(rf"^\[{GROUP}\]", text, re.MULTILINE):
+            continue
+        name, version = _identity(distribution)
+        if name.lower() in seen:  # the first on the path is the one that imports
+            continue
+        seen.add(name.lower())
+        for entry, load in _entries(distribution, name):
+            found[entry, name] = (
+                Plugin(name=entry, distribution=name, version=version, requires=_requires(distribution)), load,
+            )  # fmt: skip
+    return [found[key] for key in sorted(found)]
+
+
+def _identity(distribution: Distribution) -> tuple[str, str]:
+    """Name and version, from the folder's name if the metadata is damaged."""
+    try:
+        name, version = distribution.metadata["Name"], distribution.metadata["Version"]
+    except Exception:  # damaged metadata may raise anything; the folder's name remains
+        name, version = None, None
+    folder = getattr(getattr(distribution, "_path", None), "stem", "unknown")
+    stem, _, rest = folder.partition("-")
+    return str(name or stem), str(version or rest or "?")
+
+
+def _requires(distribution: Distribution) -> tuple[str, ...]:
+    try:
+        return tuple(distribution.requires or ())
+    except Exception:  # as above; `_entries` reports the damage
+        return ()
+
+
+def _entries(distribution: Distribution, name: str) -> list[tuple[str, Callable[[], object]]]:
+    try:
+        points = [point for point in distribution.entry_points if point.group == GROUP]
+    except Exception as error:  # a damaged entry_points.txt
+        return [(name, _raiser(BadPlugin(f"entry_points.txt of {name} cannot be read ({error}); install it again")))]
+    return [(point.name, _loader(point)) for point in points]
+
+
+def _loader(point: EntryPoint) -> Callable[[], object]:
+    return lambda: point.load()
+
+
+def _raiser(error: Exception) -> Callable[[], object]:
+    def load() -> object:
+        raise error
+
+    return load

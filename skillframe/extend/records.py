@@ -1,21 +1,39 @@
-"""What plug-ins yield: frozen records with a name, a summary and factories, so that an entry module stays light."""
+"""Records that plug-ins yield: frozen, with a name, a summary and factories, so that entry modules stay light."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from skillframe.extend.hardware import DriveType as DriveType
+from skillframe.extend.hardware import LinkType as LinkType
 from skillframe.extend.hardware import RobotType as RobotType
+from skillframe.extend.outputs import Axes as Axes
+from skillframe.extend.outputs import Curve as Curve
+from skillframe.extend.outputs import Explanation as Explanation
 from skillframe.extend.outputs import ExporterType as ExporterType
+from skillframe.extend.outputs import FolderType as FolderType
 from skillframe.extend.outputs import Grid as Grid
+from skillframe.extend.outputs import Illustration as Illustration
+from skillframe.extend.outputs import Moment as Moment
 from skillframe.extend.outputs import MovingImpedance as MovingImpedance
+from skillframe.extend.outputs import OutputType as OutputType
 from skillframe.extend.outputs import ReportFiles as ReportFiles
+from skillframe.extend.outputs import RequirementType as RequirementType
+from skillframe.extend.outputs import RowResult as RowResult
+from skillframe.extend.outputs import RowRun as RowRun
+from skillframe.extend.outputs import RowType as RowType
 from skillframe.extend.outputs import ScoreType as ScoreType
 from skillframe.extend.outputs import SectionType as SectionType
-from skillframe.extend.stalled import Stalled as Stalled
+from skillframe.extend.outputs import Segmentation as Segmentation
+from skillframe.extend.outputs import Setting as Setting
+from skillframe.extend.outputs import TimePlot as TimePlot
+from skillframe.extend.outputs import Verdict as Verdict
+from skillframe.extend.outputs import actuator_curves as actuator_curves
+from skillframe.extend.outputs import no_progress as no_progress
+from skillframe.extend.outputs import part_problem as part_problem
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -27,50 +45,42 @@ if TYPE_CHECKING:
     from skillframe.world.scene import Scene
 
 Document = dict[str, Any]
-"""A skill file's content as plain JSON values; its keys are in the contract and `skillframe.document.file`."""
+"""A skill file's content as JSON values; `skillframe.document.file` lists its keys."""
 
 
 @dataclass(frozen=True, slots=True)
 class Lazy:
-    """A factory whose module is imported when it is called, so that listing what exists loads no library.
+    """A factory whose module is imported when it is called.
 
     Attributes:
-        place: "module:function", as entry points are written.
+        place: "module:function", as in entry points.
     """
 
     place: str
 
     def load(self) -> Any:
-        """What stands at the place. Raises `ImportError` or `AttributeError` if nothing does."""
+        """Import the object at `place`. Raises `ImportError` or `AttributeError` if there is none."""
         module, _, name = self.place.partition(":")
         return getattr(import_module(module), name)
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
-        """Call what stands at the place."""
+        """Call the object at `place`."""
         return self.load()(*args, **kwargs)
-
-
-class Illustration(NamedTuple):
-    """One picture that explains a skill: a title, a caption in plain words, and the drawing as SVG text."""
-
-    title: str
-    caption: str
-    svg: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LearnOptions:
-    """The points and axes of learning that the command line sets. See the contract's "four points".
+    """Points and axes of learning, set by the command line. See the contract's "four points".
 
     Attributes:
-        at: where it is learned: "x,y,z" in the tool frame, a frame's name, or None for the recorded tool point.
-        hand: where torque work is taken; None for the demonstration's own `hand`, else the learning point.
-        axes: "base", or "phase_start": the tool's attitude at the start of the phase.
+        at: learning point: "x,y,z" in the tool frame, a frame's name, or None for the recorded tool point.
+        hand: point at which torque work is taken; None for the demonstration's own `hand`, or the learning point.
+        axes: "base", or "phase_start": the tool's orientation at the start of the phase.
         settings: the learner's own settings by name, checked by the learner.
-        toward: (3,) where the part is to go, in `axes`, if that is known: a learner that finds no direction to push in
-            may take it, and says so.
-        straight: whether it is known that the part goes straight there. A turn that was shown then only aligned the
-            part: a learner gives way to such turns, and does not push them.
+        toward: (3,) known direction of the task, in `axes`: a learner that finds no direction to push in may use it,
+            and reports that.
+        straight: whether the part is known to go straight there. A demonstrated rotation then only aligned the part, so
+            a learner makes it compliant and does not push it.
     """
 
     at: str | None = None
@@ -82,31 +92,64 @@ class LearnOptions:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Stalled:
+    """Where a skill stalls, and what is known of the way on.
+
+    A kind of skill is an exception strategy, which finds the way on, if its record has `exception`. Its skill runs as
+    any other, with three agreements:
+
+    - it starts pressed against something, or just above it, and the first pose that it observes is the one to search
+      about: the nominal axis at the height of the stall, in the nominal orientation, wherever the tool has slid to;
+    - SUCCESS means that the way on is found: the stalled skill continues from there;
+    - FAILURE means that it is not, with the reason in words.
+
+    Attributes:
+        way: (3,) unit vector along which the other skill continues, in base axes.
+        radius: largest distance of the way on from the nominal axis [m].
+        near: its likely distance [m]; None: all distances are equally likely.
+        tilt: largest angle of the fixture's orientation [rad].
+        friction: between tool and fixture, as stated.
+        frame: the `frame` block of the document that will hold the body.
+        options: points and axes of learning, and the remaining settings.
+        blind: demonstrations of a search, if any.
+    """
+
+    way: tuple[float, float, float]
+    radius: float
+    tilt: float
+    friction: float
+    frame: Document
+    options: LearnOptions
+    blind: Sequence[Demonstration] = field(default_factory=tuple)
+    near: float | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class SkillType:
     """A kind of skill.
 
     Attributes:
         name: as written in skill files and on the command line.
         summary: one line for listings.
-        contract: the version of the plug-in contract that the record was written for, "0.2"; "" for what the entry
-            module's `skillframe_contract` says (`skillframe.extend.contract`). Every record has this field.
+        contract: the version of the plug-in contract that the record was written for, "0.2"; "" for the entry module's
+            `skillframe_contract` (`skillframe.extend.contract`). Every record has this field.
         version: of the type's part of the skill file; a newer file is refused.
         build: a runnable skill from a checked skill document.
-        check: raises `InputError` naming the key if the kind's part of a document is not as it should be; None: no more
-            than the common layout is checked when a file is read.
+        check: raises `InputError` naming the key if the kind's part of a document is invalid; None: only the common
+            layout is checked when a file is read.
         learn: a skill document's body (`frame`, `phases`, ...) from demonstrations; None if it is not learned.
-        settings: gives the dataclass whose fields `--set` changes when it is learned, for listings; None: not known.
+        settings: returns the dataclass whose fields `--set` changes when it is learned, for listings; None: unknown.
         describe: the document in words, a line each.
-        advice: how sure what was learned is, and what to do next, a sentence each; None: `learn` tells all its words.
+        advice: how certain the learned skill is, and what to do next, a sentence each; None: `learn` prints all words.
         explain: pictures for the report, drawn from the document alone; None if there are none.
         area: (2, 3) corners of the box that a run may reach, relative to its start and in the axes of the document's
-            `frame` [m]; a box that leaves the robot's workspace is refused before the run. None: not known.
-        speed: [m/s] at which a document's skill moves in contact at most, from which follows how many times longer it
-            takes on arms that must move slowly; None for one that moves nothing, or if it is not known.
+            `frame` [m]; a box outside the robot's workspace is refused before the run. None: unknown.
+        speed: largest speed of a document's skill in contact [m/s], which sets how much longer it takes on slow arms;
+            None for one that does not move, or if unknown.
         example: a small valid document to try the type with, for a type that is not learned, or that the example
-            demonstrations of `skillframe.testing` do not suit.
-        exception: a document's body for finding the way on where another skill has stalled, as `extend.stalled` says;
-            None: this kind is no exception strategy.
+            demonstrations of `skillframe_testkit.suites` do not suit.
+        exception: a document's body for finding the way on where another skill has stalled (`Stalled`); None:
+            this kind is no exception strategy.
     """
 
     name: str
@@ -128,10 +171,10 @@ class SkillType:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SegmenterType:
-    """A way of cutting demonstrations into phases.
+    """A method that cuts demonstrations into phases.
 
     Attributes:
-        fit: `fit(demonstrations, phases or None, settings)` gives the phase model with boundaries and labels.
+        fit: `fit(demonstrations, phases or None, settings)` returns the phase model with boundaries and labels.
     """
 
     name: str
@@ -143,7 +186,7 @@ class SegmenterType:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CoordinatorType(SkillType):
-    """A skill for several arms: its observations and commands carry a dimension (N, arms, ...).
+    """A skill for several arms: its observations and commands have a dimension (N, arms, ...).
 
     Attributes:
         centers: (arms, 3) centres of compliance in each arm's tool frame [m] from a document; None: every arm has the
@@ -158,7 +201,7 @@ class WorldType:
     """A world that skills run in.
 
     Attributes:
-        params: a frozen dataclass type whose fields, in SI units with defaults, are what `--set world.KEY` can change.
+        params: a frozen dataclass type whose fields, in SI units with defaults, `--set world.KEY` can change.
         build: the scene (fixtures, tool, start, goal) from one value of `params`.
     """
 
@@ -170,15 +213,54 @@ class WorldType:
     build: Callable[[Any], Scene]
 
 
+def make_scene(record: WorldType, params: Mapping[str, Any]) -> Scene:
+    """The scene of a world with some parameters set, which are checked.
+
+    Raises:
+        InputError: an unknown parameter (with a suggestion) or one out of range.
+    """
+    from skillframe.config import build
+
+    values: Any = build(record.params, params, f"world.{record.name}")
+    scene = record.build(values)
+    return replace(scene, params={**scene.params, **asdict(values)})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TeacherType:
+    """A simulated teacher, who demonstrates the task of a world.
+
+    Attributes:
+        name: of the teacher, and the `kind` of its settings.
+        summary: one line for listings.
+        contract: see `SkillType`.
+        usual: `usual(scene)` returns its default settings in a world, a dataclass.
+        record: `record(model, scene, settings, *, count, seed, draws, progress, watch)` returns a
+            `skillframe.Recording`. It also takes `rate_hz`, the sample rate, and has a default for it.
+    """
+
+    name: str
+    summary: str
+    contract: str = ""
+    usual: Callable[[Scene], Any]
+    record: Callable[..., Any]
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ReaderType:
     """A demonstration file format.
 
     Attributes:
         suffixes: file name endings that select it (".csv").
-        read: `read(path, options)` gives the demonstration or raises `InputError`.
+        read: `read(path, options)` returns the demonstration or raises `InputError`.
         write: the inverse, or None.
-        table: `table(path, options)` gives the file as a table, for what `--columns auto` proposes; None: it has none.
+        table: `table(path, options)` returns the file as a table, for `--layout auto`; None: it has none.
+        topics: whether it takes the settings of topics of a ROS bag, which are refused for other formats.
+        claims: `claims(path)` returns whether a file or folder is of this format whatever its ending, or raises
+            `InputError` for a part of a recording that cannot be read by itself; None: the ending decides.
+        write_set: `write_set(demonstrations, folder)` writes several into one data set, for names without an ending;
+            None: the format has no data sets.
+        check_set: `check_set(folder)` raises `InputError` if `write_set` could not write there.
     """
 
     name: str
@@ -188,87 +270,46 @@ class ReaderType:
     read: Callable[[Path, Mapping[str, Any]], Demonstration]
     write: Callable[[Demonstration, Path], None] | None = None
     table: Callable[[Path, Mapping[str, Any]], Table] | None = None
-
-
-Verdict = Literal["pass", "fail", "reported"]
-Setting = float | int | str | bool
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RowRun:
-    """How a published result is to be computed now.
-
-    Attributes:
-        settings: the row's own, with what `--set` changed.
-        seed: everything random follows from it.
-        quick: fewer trials, for a first look and for automatic checks.
-        tell: is told in words what happens.
-    """
-
-    settings: Mapping[str, Any]
-    seed: int = 0
-    quick: bool = False
-    tell: Callable[[str], None] = print
-
-    def count(self, full: int, quick: int) -> int:
-        """How many of something: `quick` of them for a first look, else `full`."""
-        return quick if self.quick else full
+    topics: bool = False
+    claims: Callable[[Path], bool] | None = None
+    write_set: Callable[[Sequence[Demonstration], Path], None] | None = None
+    check_set: Callable[[Path], None] | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RowResult:
-    """What computing a published result gave.
+class AuditType:
+    """A check of demonstrations, which `learn` runs on its input.
 
     Attributes:
-        ours: our figure, in the words of the published one.
-        verdict: of the row's threshold; "reported" where there is none, or where it could not be computed.
-        difference: by how much it differs from the paper and why, or why it was not computed; "" if it does not.
-        computed: False if there is no figure of ours, for the reason given in `difference`.
-        values: figures by name, for scripts.
-        head, rows: a table that stands behind the figure.
-        pictures: the paper's figures, drawn from our data.
-    """
-
-    ours: str
-    verdict: Verdict = "reported"
-    difference: str = ""
-    computed: bool = True
-    values: Mapping[str, float] = field(default_factory=dict)
-    head: Sequence[str] = ()
-    rows: Sequence[Sequence[str]] = ()
-    pictures: Sequence[Illustration] = ()
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RowType:
-    """A published result, and how ours is computed: a row of `skillframe reproduce`.
-
-    Attributes:
-        name: the row's number, "13".
-        summary: what is claimed, one line.
-        published: the published figure.
-        source: where it was published.
-        bar: the threshold: what ours must be for "pass"; "" if it is reported only.
-        frozen: every constant of the method was fixed before this row's world or figure was looked at, so ours is a
-            prediction; False says that method and worlds were developed together, with fresh seeds for the figure.
-        calibrated: what was chosen with the published figure in sight; "" if nothing was.
-        weak: why reaching the threshold would show nothing, in words; such a row can fail, else it is "reported".
-        settings: what `--set` can change, with its value as shipped [SI units, unless the name says otherwise].
-        group: rows of one group are computed one after another in one process, so that they can share what is costly.
-        topic: a word or two under which the page lists the row; "" takes the group.
-        run: computes it; slow, and not in the process of the command.
+        warnings: `warnings(demonstrations)` returns a sentence for everything suspicious, with its file and the
+            evidence. Invalid recordings are refused before, at reading.
     """
 
     name: str
     summary: str
     contract: str = ""
-    published: str
-    source: str
-    bar: str = ""
-    frozen: bool = False
-    calibrated: str = ""
-    weak: str = ""
-    settings: Mapping[str, Setting] = field(default_factory=dict)
-    group: str = ""
-    topic: str = ""
-    run: Callable[[RowRun], RowResult]
+    warnings: Callable[[Sequence[Demonstration]], list[str]]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorldFileType:
+    """A kind of file that describes a world, selected by its path wherever a world is named.
+
+    Attributes:
+        name: of the kind.
+        summary: one line for listings.
+        contract: see `SkillType`.
+        world: `world(path)` returns the world of a file whose name ends with `.toml`.
+        files: `files(path)` returns the path of each other file that it names, by that name, for campaigns to copy.
+        refuse: `refuse(name)` raises `InputError` for a name that is mistaken for a world, such as a part's file.
+        found: `found(path, say)` returns what is found in a file, in sentences and as JSON values, for `skillframe
+            worlds FILE`; `say` takes messages on progress.
+    """
+
+    name: str
+    summary: str
+    contract: str = ""
+    world: Callable[[Path], WorldType]
+    files: Callable[[Path], Mapping[str, Path]]
+    refuse: Callable[[str], None] | None = None
+    found: Callable[[Path, Callable[[str], None]], tuple[Sequence[str], Mapping[str, Any]]] | None = None

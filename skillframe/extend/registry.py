@@ -1,9 +1,9 @@
-"""What exists: discovers plug-ins, isolates the ones that fail, and answers to names.
+"""The registry: discovers plug-ins, isolates those that fail, and looks up names.
 
-pluggy is used for discovery only. Each entry point is loaded on its own, and each hook implementation is called on its
-own, so that a plug-in that fails to import or raises loses its own records and nothing else; it is named in
-`Registry.plugins` with its distribution, version and error. The environment variable `SKILLFRAME_PLUGINS` (comma list
-of entry-point names, empty for none) selects a subset; `SKILLFRAME_STRICT_PLUGINS=1` raises instead of isolating.
+pluggy is used for discovery only. Each entry point and each hook implementation runs on its own, so that a plug-in that
+fails loses only its own records; `Registry.plugins` has its distribution, version and error. The environment variable
+`SKILLFRAME_PLUGINS` (comma list of entry-point names, empty for none) selects plug-ins; `SKILLFRAME_STRICT_PLUGINS=1`
+raises errors instead of isolating them.
 """
 
 from __future__ import annotations
@@ -13,45 +13,50 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import redirect_stdout
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import pluggy
 
-from skillframe.errors import UnknownName
+from skillframe.errors import SkillframeError, UnknownName
 from skillframe.extend import hookspecs
 from skillframe.extend.contract import ATTRIBUTE, GROUP, contract_problem, requirement_problem
-from skillframe.extend.discovery import installed
-from skillframe.extend.homes import where_to_get
-from skillframe.extend.part_worlds import FILE_ENDING, refuse_part, world_of_file
+from skillframe.extend.homes import homes, install_line, where_to_get
+from skillframe.extend.isolated import isolated
 from skillframe.extend.plugin import KINDS as KINDS
 from skillframe.extend.plugin import RECORDS as RECORDS
 from skillframe.extend.plugin import BadPlugin as BadPlugin
 from skillframe.extend.plugin import OtherContract as OtherContract
 from skillframe.extend.plugin import Plugin as Plugin
 from skillframe.extend.plugin import PluginConflict as PluginConflict
-from skillframe.extend.plugin import checked, hook_problems
+from skillframe.extend.plugin import checked, hook_problems, installed
 from skillframe.extend.records import (
     CoordinatorType,
     DriveType,
     ExporterType,
+    OutputType,
     ReaderType,
     RobotType,
     RowType,
     ScoreType,
-    SectionType,
     SegmenterType,
     SkillType,
+    TeacherType,
+    WorldFileType,
     WorldType,
 )  # fmt: skip
 
+WORLD_FILE = ".toml"
+"""Ending of a file that describes a world."""
+
 
 class Registry:
-    """Records by kind and name, and the plug-ins they came from.
+    """Records by kind and name, and their plug-ins.
 
     Attributes:
-        plugins: every plug-in that was found and selected, in the order of loading.
+        plugins: all selected plug-ins, in the order of loading.
         unselected: names of installed plug-ins that `SKILLFRAME_PLUGINS` leaves out.
-        not_installed: names that `SKILLFRAME_PLUGINS` asks for and that nothing installed has.
+        not_installed: names in `SKILLFRAME_PLUGINS` that are not installed.
     """
 
     def __init__(self) -> None:
@@ -64,10 +69,10 @@ class Registry:
         self.not_installed: list[str] = []
 
     def add(self, plugin: Plugin, load: Callable[[], object]) -> Plugin:
-        """Load one plug-in and collect its records. What fails is kept in `Plugin.error`.
+        """Load one plug-in and collect its records. Errors are stored in `Plugin.error`.
 
         A hook that fails loses its own records. A name that another plug-in already has is an error of this one, and
-        asking for it raises `PluginConflict`. A plug-in that was written for another contract, or asks for another
+        looking it up raises `PluginConflict`. A plug-in that was written for another contract, or requires another
         skillframe, is not loaded. What a plug-in prints while it loads goes to stderr.
         """
         from skillframe import __version__
@@ -75,12 +80,12 @@ class Registry:
         self.plugins.append(plugin)
         try:
             _refuse(requirement_problem(plugin.requires, __version__))
-            with redirect_stdout(sys.stderr):
+            with redirect_stdout(sys.stderr), isolated(BadPlugin):
                 module = load()
             _refuse(contract_problem("the plug-in", getattr(module, ATTRIBUTE, "")))
             self._manager.register(module, name=f"{plugin.name} [{plugin.distribution}]")
             problems = list(hook_problems(module))
-        except (Exception, SystemExit) as error:  # one plug-in must not take the rest down
+        except Exception as error:  # a plug-in's error must not stop the others
             plugin.fail(error)
             return plugin
         for problem in problems:
@@ -95,9 +100,9 @@ class Registry:
             if implementation.plugin is not module:
                 continue
             try:
-                with redirect_stdout(sys.stderr):
+                with redirect_stdout(sys.stderr), isolated(BadPlugin):
                     records = checked(kind, implementation.function())
-            except (Exception, SystemExit) as error:  # see `add`
+            except Exception as error:  # see `add`
                 plugin.fail(error)
                 continue
             for record in records:
@@ -123,92 +128,128 @@ class Registry:
         return (self._records[kind][name][0] for name in self.names(kind))
 
     def provider(self, kind: str, name: str) -> Plugin:
-        """The plug-in that provides a name. Raises as `skill` does."""
-        self._get(kind, name)
+        """The plug-in that provides a name. Raises as `skill`."""
+        self.record(kind, name)
         return self._records[kind][name][1]
 
-    def _get(self, kind: str, name: str) -> Any:
+    def record(self, kind: str, name: str) -> Any:
+        """The record of a kind ("skill", "world" ...) and name.
+
+        Raises:
+            UnknownName: there is none.
+            PluginConflict: two plug-ins have it.
+        """
         if (kind, name) in self._conflicts:
             raise self._conflicts[kind, name]
         if name not in self._records[kind]:
             raise UnknownName(kind, name, self.names(kind), self._absences(kind, name))
         return self._records[kind][name][0]
 
+    def absence(self, kind: str, name: str) -> str:
+        """Which first-party plug-in provides an absent name, why it is absent, and the command that installs it.
+
+        "" if it is present, or no first-party plug-in provides the name.
+        """
+        home = homes().get(f"{kind}:{name}")
+        if home in self.unselected:
+            return f"skillframe-{home} does, and SKILLFRAME_PLUGINS leaves it out"
+        for plugin in self.plugins:
+            if plugin.name == home:
+                failed = f"{plugin.distribution} {plugin.version} does, and failed to load ({plugin.error})"
+                return failed if plugin.error else ""
+        return f"skillframe-{home} does, and is not installed; type: {install_line(home)}" if home else ""
+
     def _absences(self, kind: str, name: str) -> str:
-        """Why a plug-in that a person has in mind may not be here."""
+        """Why the plug-in of a missing name may be absent."""
         here = [*(plugin.name for plugin in self.plugins), *self.unselected]
         failed = [f"{p.distribution} {p.version} ({p.error})" for p in self.plugins if p.error]
         notes = [f"these plug-ins failed to load: {', '.join(failed)}"] if failed else []
         if self.unselected:
             notes.append(f"SKILLFRAME_PLUGINS leaves out {', '.join(self.unselected)}")
         if self.not_installed:
-            notes.append(f"SKILLFRAME_PLUGINS asks for {', '.join(self.not_installed)}, which is not installed")
+            notes.append(f"SKILLFRAME_PLUGINS names {', '.join(self.not_installed)}, which is not installed")
         missing = where_to_get(kind, name, self._records[kind], here)
         return "; ".join([missing, *notes] if missing else notes)
 
     def skill(self, name: str) -> SkillType:
         """The skill type of that name. Raises `UnknownName`, or `PluginConflict` if two plug-ins have it."""
-        record: SkillType = self._get("skill", name)
+        record: SkillType = self.record("skill", name)
         return record
 
     def segmenter(self, name: str) -> SegmenterType:
-        """The segmenter of that name. Raises as `skill` does."""
-        record: SegmenterType = self._get("segmenter", name)
+        """The segmenter of that name. Raises as `skill`."""
+        record: SegmenterType = self.record("segmenter", name)
         return record
 
     def coordinator(self, name: str) -> CoordinatorType:
-        """The coordinator of that name. Raises as `skill` does."""
-        record: CoordinatorType = self._get("coordinator", name)
+        """The coordinator of that name. Raises as `skill`."""
+        record: CoordinatorType = self.record("coordinator", name)
         return record
 
     def behaviour(self, name: str) -> SkillType:
-        """The coordinator or else the skill type of that name: whatever a skill file can hold. Raises as `skill`."""
+        """The coordinator or skill type of that name, as a skill file may hold. Raises as `skill`."""
         return self.coordinator(name) if name in self._records["coordinator"] else self.skill(name)
 
     def world(self, name: str) -> WorldType:
-        """The world of that name, or of that fixture file, "path/fixture.toml". Raises as `skill` does.
+        """The world of that name, or of that fixture file, "path/fixture.toml". Raises as `skill`.
 
         A fixture file that cannot be used raises `InputError`.
         """
-        if name.endswith(FILE_ENDING):
-            return world_of_file(name)
-        refuse_part(name)
-        record: WorldType = self._get("world", name)
+        if name.endswith(WORLD_FILE):
+            return self.world_file().world(Path(name))
+        for kind in self.records("world_file"):
+            if kind.refuse is not None:
+                kind.refuse(name)
+        record: WorldType = self.record("world", name)
+        return record
+
+    def world_file(self) -> WorldFileType:
+        """The kind of file that describes a world. Raises `SkillframeError` if no plug-in reads one."""
+        found: WorldFileType | None = next(self.records("world_file"), None)
+        if found is None:
+            raise SkillframeError(
+                self._absences("world_file", "parts") or "no plug-in reads files that describe a world"
+            )
+        return found
+
+    def teacher(self, name: str) -> TeacherType:
+        """The simulated teacher of that name. Raises as `skill`."""
+        record: TeacherType = self.record("teacher", name)
         return record
 
     def reader(self, name: str) -> ReaderType:
-        """The file format of that name. Raises as `skill` does."""
-        record: ReaderType = self._get("reader", name)
+        """The file format of that name. Raises as `skill`."""
+        record: ReaderType = self.record("reader", name)
         return record
 
     def row(self, name: str) -> RowType:
-        """The published result of that number. Raises as `skill` does."""
-        record: RowType = self._get("row", name)
+        """The published result of that number. Raises as `skill`."""
+        record: RowType = self.record("row", name)
         return record
 
     def exporter(self, name: str) -> ExporterType:
-        """The exporter of that name. Raises as `skill` does."""
-        record: ExporterType = self._get("exporter", name)
+        """The exporter of that name. Raises as `skill`."""
+        record: ExporterType = self.record("exporter", name)
         return record
 
     def score(self, name: str) -> ScoreType:
-        """The score of that name. Raises as `skill` does."""
-        record: ScoreType = self._get("score", name)
+        """The score of that name. Raises as `skill`."""
+        record: ScoreType = self.record("score", name)
         return record
 
     def robot(self, name: str) -> RobotType:
-        """The robot of that name that ships with skillframe or a plug-in. Raises as `skill` does."""
-        record: RobotType = self._get("robot", name)
+        """The robot of that name of skillframe or a plug-in. Raises as `skill`."""
+        record: RobotType = self.record("robot", name)
         return record
 
     def drive(self, name: str) -> DriveType:
-        """The drive of that name. Raises as `skill` does."""
-        record: DriveType = self._get("drive", name)
+        """The drive of that name. Raises as `skill`."""
+        record: DriveType = self.record("drive", name)
         return record
 
-    def section(self, name: str) -> SectionType:
-        """The section of reports of that name. Raises as `skill` does."""
-        record: SectionType = self._get("section", name)
+    def output(self, name: str) -> OutputType:
+        """The kind of file of that name. Raises as `skill`."""
+        record: OutputType = self.record("output", name)
         return record
 
 
@@ -217,8 +258,18 @@ def _refuse(problem: str) -> None:
         raise OtherContract(problem)
 
 
+def robot_folders(name: str | None = None) -> dict[str, Path]:
+    """Folder by name of every registered robot, or of one.
+
+    Raises:
+        UnknownName: there is none of that name; `PluginConflict` if two plug-ins have it.
+    """
+    records = registry().records("robot") if name is None else [registry().robot(name)]
+    return {record.name: Path(record.folder) for record in records}
+
+
 def load_registry() -> Registry:
-    """A fresh registry: what ships with the core, then every selected plug-in that is installed."""
+    """A new registry with the core and all selected plug-ins."""
     from skillframe import __version__
     from skillframe.extend import builtin
 

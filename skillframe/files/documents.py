@@ -1,36 +1,46 @@
-"""JSON and TOML as plain values that the rest can use: the one place where text from outside is parsed.
+"""Documents from outside: JSON and TOML as plain values, npz files as arrays.
 
-Beyond the syntax three things are refused, because they break code far from here: a nesting that recursive code cannot
-walk, a whole number beyond 64 bits (TOML promises no more; JSON has no whole numbers, so a longer one becomes a float),
-and half of a surrogate pair, which JSON can escape and no file can hold.
+Refused are deep nesting, which breaks recursive code, integers beyond 64 bits (floats in JSON), and lone surrogates,
+which no file can hold.
+
+`kind_of` recognises skillframe's own files by content, to name a file given in place of another.
+
+Of npz files nothing is unpickled. The declared sizes of their arrays are summed before unpacking, against
+decompression bombs.
 """
 
 from __future__ import annotations
 
 import json
+import math
+import re
 import tomllib
+import xml.etree.ElementTree as ET
+import zipfile
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
+from xml.parsers import expat
+
+import numpy as np
+from numpy.typing import NDArray
 
 from skillframe.errors import InputError
 
 DEEPEST = 100
-"""Lists and tables within each other; ours have less than ten (our choice)."""
+DEEP = re.compile(rf"(?:[\[{{][^\[\]{{}}]*){{{DEEPEST + 1}}}")
+"""Most levels of nesting; skillframe's files have ten."""
 LARGEST_WHOLE = 2**63 - 1
 DIGITS = 18
-"""Digits that always fit into 64 bits."""
+"""Digits that always fit 64 bits."""
 
 
 class NotToml(InputError):
-    """Text that is not TOML, as told apart from TOML that holds what we refuse."""
+    """Text is not TOML, in contrast to refused content."""
 
 
 def read_text(path: Path, fix: str = "give a text file") -> str:
-    """The text of a file in UTF-8, without a byte order mark.
-
-    Args:
-        path: the file.
-        fix: what to do if it is no text, for the message.
+    """UTF-8 text of a file, without byte order mark. `fix` is advice for the message.
 
     Raises:
         InputError: missing, a folder, unreadable, or not UTF-8.
@@ -41,38 +51,31 @@ def read_text(path: Path, fix: str = "give a text file") -> str:
         raise InputError(path, "no such file", "check the path") from None
     except UnicodeDecodeError:
         raise InputError(path, "is a binary file, not text in UTF-8", fix) from None
-    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+    except (OSError, ValueError) as error:
         said = getattr(error, "strerror", None) or error
         raise InputError(path, f"cannot be read as text ({said})", fix) from None
 
 
 def read_json(path: Path, fix: str) -> Any:
-    """The content of a JSON file.
-
-    Args:
-        path: the file.
-        fix: what to do if it cannot be used, for the message.
+    """Content of a JSON file. `fix` is advice for the message.
 
     Raises:
-        InputError: it cannot be read, is not JSON, or holds what `parse_json` refuses.
+        InputError: unreadable, or as `parse_json`.
     """
     return parse_json(read_text(path, fix), path, fix)
 
 
 def parse_json(text: str | bytes, where: object, fix: str) -> Any:
-    """Plain values from JSON text.
-
-    Args:
-        text: the whole document.
-        where: for messages.
-        fix: what to do if it cannot be used, for the message.
+    """Plain values from JSON text. `where` and `fix` are for the message.
 
     Raises:
-        InputError: it is not JSON (with the line), is nested too deeply, or holds half a surrogate pair.
+        InputError: not JSON, nested too deeply, or a lone surrogate.
     """
     try:
         value = json.loads(text, parse_int=_whole)
     except json.JSONDecodeError as error:
+        if DEEP.search(error.doc):
+            raise too_deep(where, fix) from None
         raise InputError(where, _not_json(error), fix) from None
     except UnicodeDecodeError:
         raise InputError(where, "is not text in UTF-8", fix) from None
@@ -83,7 +86,6 @@ def parse_json(text: str | bytes, where: object, fix: str) -> Any:
 
 
 def _not_json(error: json.JSONDecodeError) -> str:
-    """What is wrong with text that is not JSON, or that the file was cut off."""
     if not error.doc.strip():
         return "is empty"
     cut = not error.doc[error.pos :].strip() or "Unterminated string" in error.msg
@@ -96,31 +98,33 @@ def parse_toml(text: str, where: object) -> dict[str, Any]:
     """Plain values from TOML text.
 
     Raises:
-        NotToml: the syntax is wrong (with the line).
-        InputError: it is nested too deeply, or holds a number beyond 64 bits.
+        NotToml: wrong syntax.
+        InputError: nested too deeply, or a number beyond 64 bits.
     """
     try:
         value = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
+        if DEEP.search(text):
+            raise too_deep(where, "correct it") from None
         raise NotToml(where, f"is not valid TOML: {error}", "correct that line") from None
     except RecursionError:
         raise too_deep(where, "correct it") from None
-    except ValueError:  # Python reads no whole number of more than 4300 digits
+    except ValueError:
         raise InputError(where, "holds a number with thousands of digits", "give a number of usual length") from None
     check_plain(value, where, "correct it")
     return value
 
 
 def too_deep(where: object, fix: str) -> InputError:
-    """The refusal of a document whose lists and tables stand too deep within each other."""
+    """Error for excessive nesting."""
     return InputError(where, f"is nested too deeply (more than {DEEPEST} levels)", fix)
 
 
 def check_plain(value: Any, where: object, fix: str) -> None:
-    """Refuse what breaks code that walks or stores plain values.
+    """Refuse plain values that break other code.
 
     Raises:
-        InputError: nested too deeply, a whole number beyond 64 bits, or text that cannot be stored; names the key.
+        InputError: nested too deeply, an integer beyond 64 bits, or a lone surrogate; names the key.
     """
     waiting: list[tuple[Any, int, str]] = [(value, 0, "")]
     while waiting:
@@ -139,7 +143,7 @@ def check_plain(value: Any, where: object, fix: str) -> None:
 
 
 def storable(text: str) -> bool:
-    """Whether a text can be written to a file: it holds no half of a surrogate pair."""
+    """Whether a text has no lone surrogates, so that files can hold it."""
     try:
         text.encode()
     except UnicodeEncodeError:
@@ -148,7 +152,7 @@ def storable(text: str) -> bool:
 
 
 def shown(text: str) -> str:
-    """A text that can be stored and printed: what has no character, as in file names of other encodings, is escaped."""
+    """Printable text, with lone surrogates (file names of other encodings) escaped."""
     return text.encode("utf-8", "backslashreplace").decode()
 
 
@@ -157,10 +161,191 @@ def _at(where: object, key: str) -> str:
 
 
 def _whole(text: str) -> int | float:
-    """A whole number of JSON: exact where 64 bits hold it, else the nearest float, infinity beyond all of them."""
+    """JSON integer: exact within 64 bits, else the nearest float or infinity."""
     if len(text) <= DIGITS:
         return int(text)
     if len(text) > DIGITS + 2:
         return float(text)
     value = int(text)
     return value if abs(value) <= LARGEST_WHOLE else float(value)
+
+
+COMMANDS = {
+    "skill": "skillframe show {}",
+    "campaign": "skillframe campaign run {} --out FOLDER, or certify run",
+    "task": "skillframe certify run {} --out FOLDER",
+    "fixture": "skillframe worlds {}",
+    "robot": "skillframe robots {} --check",
+}
+"""Command for each kind of file."""
+
+
+def refuse_other(path: Path, wanted: str) -> None:
+    """Refuse a TOML or JSON file of another kind than wanted.
+
+    Raises:
+        InputError: names both kinds, and the command for this file.
+    """
+    found = kind_of(path)
+    if found not in ("", wanted):
+        fix = f"give the {wanted}, or type {COMMANDS[found].format(path)}"
+        raise InputError(path, f"is a {found} file, and a {wanted} is wanted here", fix)
+
+
+def kind_of(path: Path) -> str:
+    """Kind of a file, or "" if none or unreadable."""
+    readers: Mapping[str, Any] = {".toml": tomllib.loads, ".json": json.loads}
+    try:
+        # larger ones are recordings in JSON, and a pipe would be waited for
+        if path.suffix not in readers or not path.is_file() or path.stat().st_size > 1_000_000:
+            return ""
+        values = readers[path.suffix](path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return ""
+    if not isinstance(values, dict):
+        return ""
+    marks = {
+        "skill": values.get("format") == "skillframe.skill", "robot": "urdf" in values, "campaign": "skills" in values,
+        "task": "teacher" in values or "demonstrations" in values, "fixture": {"fixture", "tool"} <= values.keys(),
+    }  # fmt: skip
+    return next((kind for kind, is_one in marks.items() if is_one), "")
+
+
+MOST_BYTES = 1_000_000_000
+"""Largest unpacked size in bytes (an hour at 1 kHz with 30 columns)."""
+SMALL = 64_000_000
+"""Unpacked bytes always allowed (constant columns pack well)."""
+RATIO = 100
+"""Largest ratio of unpacked to packed bytes beyond `SMALL`; recordings reach 10."""
+NUMBER = 8
+"""Bytes of a number."""
+
+
+def refuse_bomb(path: Path | str, packed: int, unpacked: int, fix: str, most: float = MOST_BYTES) -> None:
+    """Refuse a file, or a part, by its packed and unpacked bytes. `most` is infinity if read in parts.
+
+    Raises:
+        InputError: with both sizes.
+    """
+    if unpacked > min(most, max(SMALL, RATIO * packed)):
+        raise InputError(path, f"has {packed} bytes and would unpack to {unpacked}, which no recording does", fix)
+
+
+MOST_MEMBERS = 1000
+ENDING = ".npy"
+Arrays = dict[str, NDArray[Any]]
+
+
+def read_arrays(path: Path, kind: str, fix: str) -> Arrays:
+    """Every array of an npz file, by name. `kind` and `fix` are for messages.
+
+    Raises:
+        InputError: missing, not npz, damaged, with Python objects, or too large.
+    """
+    try:
+        size = path.stat().st_size
+        if path.is_dir():
+            raise InputError(path, "is a folder", "give a file")
+        if not size:
+            raise InputError(path, "is empty", fix)
+        with zipfile.ZipFile(path) as archive:
+            members = archive.infolist()
+            names = [info.filename for info in members]
+            if len(members) > MOST_MEMBERS:
+                raise InputError(path, f"holds {len(members)} arrays, and {MOST_MEMBERS} are allowed", fix)
+            if len(set(names)) != len(names):
+                raise InputError(path, "holds two arrays of one name", fix)
+            refuse_bomb(path, size, sum(info.file_size for info in members), fix)
+            for info in members:
+                if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                    raise InputError(path, f"{info.filename!r} is packed in another way than npz files are", fix)
+            return {info.filename.removesuffix(ENDING): _array(archive, info) for info in archive.infolist()}
+    except FileNotFoundError:
+        raise InputError(path, "no such file", "check the path") from None
+    except (InputError, MemoryError):  # not the file's fault
+        raise
+    except Exception as error:  # foreign bytes: BadZipFile, zlib.error, EOFError, SyntaxError, struct.error ...
+        said = " ".join(str(error).split())[:120]
+        problem = f"is not a readable {kind}, or is damaged" + (f" ({said})" if said else "")
+        raise InputError(path, problem, fix) from None
+
+
+def json_member(path: Path, arrays: Arrays, name: str, fix: str) -> dict[str, Any] | None:
+    """JSON object in one array's text, or None for other content.
+
+    Raises:
+        InputError: invalid JSON, or as `documents.parse_json`.
+    """
+    array = arrays[name]
+    if array.size != 1 or array.dtype.kind not in "US":
+        return None
+    text = array.reshape(-1)[0]
+    try:
+        value = parse_json(text if isinstance(text, bytes) else str(text), f"{path}: {name}", fix)
+    except InputError as error:
+        raise InputError(error.where, f"is not a JSON object ({error.problem})", fix) from None
+    return value if isinstance(value, dict) else None
+
+
+def _array(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> NDArray[Any]:
+    with archive.open(info) as file:
+        version = np.lib.format.read_magic(file)
+        read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+        shape, _, dtype = read(file)
+        if dtype.hasobject:
+            raise ValueError("it holds Python objects, which are never loaded")
+        declared, held = math.prod(shape) * dtype.itemsize, info.file_size - file.tell()
+        if declared != held or min(shape, default=0) < 0:
+            raise ValueError(f"{info.filename} says {declared} bytes and holds {held}")
+    with archive.open(info) as file:
+        array: NDArray[Any] = np.lib.format.read_array(file, allow_pickle=False)
+        return array
+
+
+def read_bytes(path: Path, kind: str = "a URDF") -> bytes:
+    """Content of an XML file.
+
+    Raises:
+        InputError: unreadable, empty, binary or too large.
+    """
+    if path.is_dir():
+        raise InputError(path, "is a folder", f"give {kind} file in it")
+    try:
+        if path.stat().st_size > 64 * 2**20:  # the largest humanoids are below 1 MB
+            raise InputError(path, "is larger than 64 MB", f"is it {kind}?")
+        content = path.read_bytes()
+    except OSError as error:
+        raise InputError(path, f"cannot be read ({error.strerror})", "check the path") from None
+    if not content.strip():
+        raise InputError(path, "is empty", f"give {kind}")
+    if b"\0" in content[:1024] and content[:2] not in (b"\xff\xfe", b"\xfe\xff"):
+        raise InputError(path, f"is a binary file, not {kind}", f"give {kind} itself, which is XML text")
+    return content
+
+
+def parse_xml(path: Path, content: bytes, text: bool = False) -> ET.Element:
+    """Element tree by expat, without namespaces.
+
+    Document types are refused before entities expand. `text` keeps the text between elements.
+
+    Raises:
+        InputError: invalid XML, or a document type.
+    """
+    builder, parser = ET.TreeBuilder(), expat.ParserCreate()
+
+    def refuse(*_: object) -> NoReturn:
+        raise InputError(f"{path}: line {parser.CurrentLineNumber}", "has a document type (DOCTYPE)", "remove it")
+
+    parser.StartDoctypeDeclHandler = refuse
+    parser.StartElementHandler = builder.start
+    parser.EndElementHandler = builder.end
+    if text:
+        parser.CharacterDataHandler = builder.data
+    try:
+        parser.Parse(content, True)
+    except expat.ExpatError as error:
+        where = f"{path}: line {error.lineno}"
+        raise InputError(where, f"is not valid XML ({expat.ErrorString(error.code)})", "correct that line") from None
+    except (LookupError, ValueError) as error:
+        raise InputError(path, f"is in an encoding that cannot be read ({error})", "save it as UTF-8") from None
+    return builder.close()

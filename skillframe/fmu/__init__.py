@@ -1,1 +1,1 @@
-"""FMUs: files, builds, instances and banks of them, in this process or in child processes. No oil here."""
+"""FMUs: files, builds, instances and banks, in this or in child processes."""

@@ -1,8 +1,6 @@
-"""The contract of actuators in the loop: a bank of them, stepped together, motion in and force out.
+"""Interface of actuators in the loop: a bank stepped together, motion in and force out.
 
-A bank holds `trials` x (actuators of the robot) instances, trial by trial. The caller writes `u`, steps, and reads `y`;
-no call allocates. The acceleration lets an actuator follow the piston inside a step, x(s) = x + v s + a s^2/2, which
-makes the coupling of second order (our measurement, tests of `cosim`).
+A bank has `trials` x (actuators of the robot) instances, trial by trial. In a step x(s) = x + v s + a s^2/2.
 """
 
 from __future__ import annotations
@@ -21,19 +19,19 @@ OUTPUTS = ("force", "force_mean", "work", "pressure_a", "pressure_b", "flow_a", 
 OK, WARNING, DISCARD, ERROR, FATAL, NOT_FINITE, ENDED, LOST = range(8)
 STATUS_TEXT = (
     "fine", "a warning", "the step was refused", "an error", "a fatal error", "an output is not a finite number",
-    "the FMU asked to end", "its process was lost",
+    "the FMU terminated the simulation", "its process was lost",
 )  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ActuatorSpec:
-    """One actuator as robot.toml declares it.
+    """An actuator as declared in robot.toml.
 
     Attributes:
-        fmu: a name in `fmus/`, or a path to an FMU.
+        fmu: a name in `fmus/`, or a path.
         parameters: FMU's parameters by name.
-        inputs, outputs: our names to the FMU's; empty takes the FMU's variables that have our names.
-        name: for messages, usually the joint.
+        inputs, outputs: names here to the FMU's names.
+        name: for messages.
     """
 
     fmu: str
@@ -44,11 +42,11 @@ class ActuatorSpec:
 
 
 class Capabilities(NamedTuple):
-    """What an actuator can do, tried out and not only claimed (`probe`).
+    """Tested capabilities of an actuator (`probe`).
 
     Attributes:
-        acceleration: takes the piston's acceleration; force_mean, work: gives mean force and work of a step.
-        rollback: saving, stepping, restoring and stepping again gives the identical result.
+        acceleration: takes the joint's acceleration; force_mean, work: gives mean force and work of a step.
+        rollback: steps repeated from a saved state are identical.
         variable_step: steps of any length; refresh: outputs follow inputs without a step.
     """
 
@@ -64,11 +62,11 @@ class Actuators(Protocol):
     """A bank of actuators.
 
     Attributes:
-        count: number of instances; inputs, outputs: names of the columns of `u` and `y`.
-        u: (count, len(inputs)), written by the caller; y: (count, len(outputs)), NaN where an FMU lacks an output.
-        active: (count,) 1 for instances that are stepped; the bank clears it where one has failed.
-        status: (count,) outcome of the last call, OK to LOST.
-        notes: sentences for the user, such as that a slower stand-in runs.
+        count: number of instances; inputs, outputs: columns of `u` and `y`.
+        u: (count, len(inputs)), written by the caller; y: (count, len(outputs)), NaN for missing outputs.
+        active: (count,) 1 for stepped instances, 0 after a failure.
+        status: (count,) outcome of the last call.
+        notes: messages for the user.
     """
 
     count: int
@@ -81,25 +79,32 @@ class Actuators(Protocol):
     notes: tuple[str, ...]
 
     def start(self, time: float = 0.0, parameters: Sequence[Mapping[str, Any]] | None = None) -> None:
-        """Reset every instance and initialise it at `u`. `parameters` has one mapping per instance."""
+        """Initialise every instance at `u`, with one mapping of `parameters` each."""
 
     def step(self, time: float, step: float) -> bool:
-        """Advance from `time` by `step` [s] with inputs `u`. Returns True if every active instance went well."""
+        """Advance from `time` by `step` [s] with inputs `u`. Returns True if all active instances succeed."""
 
     def refresh(self) -> bool:
-        """Outputs at the present inputs. No time passes."""
+        """Update outputs for the present inputs."""
 
     def save(self) -> None:
-        """Remember the state of every active instance, for `restore`."""
+        """Save the state of active instances."""
 
     def restore(self) -> None:
-        """Return to the state of the last `save`."""
+        """Restore the saved state."""
 
     def capabilities(self, index: int) -> Capabilities:
-        """What one instance can do."""
+        """Capabilities of an instance."""
 
     def problem(self, index: int) -> str:
-        """Why an instance failed, one sentence, or empty if it did not."""
+        """Reason for an instance's failure, or ""."""
 
     def close(self) -> None:
-        """Free everything. The bank cannot be used afterwards."""
+        """Free the bank."""
+
+
+def columns(specs: Sequence[ActuatorSpec]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Columns of `u` and `y`: the standard ones, then those of mappings."""
+    more_in = [name for spec in specs for name in spec.inputs if name not in INPUTS]
+    more_out = [name for spec in specs for name in spec.outputs if name not in OUTPUTS]
+    return (*INPUTS, *dict.fromkeys(more_in)), (*OUTPUTS, *dict.fromkeys(more_out))

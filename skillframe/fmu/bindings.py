@@ -1,4 +1,4 @@
-"""One FMU instance: fmpy creates, initialises and frees it. The loop calls its functions by address."""
+"""One FMU instance, created, initialised and freed by fmpy. The loop calls its functions by address."""
 
 from __future__ import annotations
 
@@ -14,16 +14,14 @@ from weakref import WeakValueDictionary
 from skillframe.errors import SkillframeError
 from skillframe.fmu.actuator import DISCARD
 from skillframe.fmu.extract import unpack
-from skillframe.fmu.inspection import FmuFacts
-from skillframe.fmu.values import values_of
+from skillframe.fmu.facts import FmuFacts, values_of
 
-LAST_SUCCESSFUL_TIME, TERMINATED = 2, 3  # of fmi2StatusKind
 _KEYS = itertools.count(1)
 _LISTENERS: WeakValueDictionary[int, Instance] = WeakValueDictionary()
 
 
 def _hear2(key: int | None, name: bytes, status: int, category: bytes, text: bytes | None) -> None:
-    """FMI 2 messages of every instance: fmpy's formatting proxy knows one logger only, so a key tells them apart."""
+    """Dispatch FMI 2 messages by key: fmpy's formatting proxy has only one logger."""
     instance = _LISTENERS.get(key or 0)
     if instance is not None:
         instance._hear(text)
@@ -37,7 +35,6 @@ def _logger2() -> Any:
 
 
 def _callbacks2(key: int) -> Any:
-    """Callbacks of an FMI 2 instance. Messages that come with printf arguments are formatted by fmpy's proxy."""
     from fmpy import calloc, fmi2, free
 
     calls = fmi2.fmi2CallbackFunctions()
@@ -45,26 +42,29 @@ def _callbacks2(key: int) -> Any:
     calls.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
     calls.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
     calls.componentEnvironment = key
-    with suppress(ImportError, OSError):  # without it, messages come unformatted
+    with suppress(ImportError, OSError):
         from fmpy.logging import addLoggerProxy
 
         addLoggerProxy(ctypes.byref(calls))
     return calls
 
 
+NOT_LOADED = "does not load"
+
+
 class InstanceFailed(SkillframeError):
-    """An FMU refused a call outside the loop. The sentence carries its own message."""
+    """An FMU refused a call outside the loop, with its message."""
 
 
 class Instance:
     """A co-simulation instance.
 
     Attributes:
-        version: 2 or 3; component: its handle; messages: what it said last, newest last.
+        version: 2 or 3; component: its handle; messages: the last ones, newest last.
     """
 
     def __init__(self, facts: FmuFacts, name: str) -> None:
-        """Load the library and instantiate (once; `start` resets).
+        """Load the library and instantiate.
 
         Raises:
             InputError: not runnable here.
@@ -74,10 +74,7 @@ class Instance:
         self.facts, self.name = facts, name
         self.version = int(facts.fmi_version[0])
         self.messages: deque[str] = deque(maxlen=8)
-        self._fresh, self._states = True, {}  # type: bool, dict[str, ctypes.c_void_p]
-        self._create()
-
-    def _create(self) -> None:
+        self._states: dict[str, ctypes.c_void_p] = {}
         from fmpy.fmi2 import FMU2Slave
         from fmpy.fmi3 import FMU3Slave
 
@@ -86,45 +83,36 @@ class Instance:
                 guid=self.facts.token, unzipDirectory=str(unpack(self.facts.path)),
                 modelIdentifier=self.facts.identifier, instanceName=self.name,
             )  # fmt: skip
-            self._instantiate()
+            if self.version == 3:
+                self._fmu.instantiate(logMessage=lambda env, status, category, text: self._hear(text))
+            else:
+                key = next(_KEYS)
+                _LISTENERS[key] = self
+                self._fmu.instantiate(callbacks=_callbacks2(key))
         except Exception as error:
             tool = "; its maker's tool must be installed" if self.facts.needs_tool else ""
-            raise InstanceFailed(self.sentence(f"does not load: {error}") + tool) from None
+            raise InstanceFailed(self.sentence(f"{NOT_LOADED}: {error}") + tool) from None
         self.component = int(getattr(self._fmu.component, "value", self._fmu.component))
         self._fresh = True
 
-    def _instantiate(self) -> None:
-        if self.version == 3:
-            self._fmu.instantiate(logMessage=lambda env, status, category, text: self._hear(text))
-            return
-        key = next(_KEYS)
-        _LISTENERS[key] = self
-        self._fmu.instantiate(callbacks=_callbacks2(key))
-
     def _hear(self, text: bytes | None) -> None:
-        """Keep what the FMU said, in one line: makers log whole stack traces."""
         self.messages.append(" ".join((text or b"").decode("utf-8", "replace").split())[:300])
 
     def sentence(self, problem: str) -> str:
-        """A problem with this instance, with what the FMU itself said last."""
+        """A problem with the FMU's last message."""
         said = f" ({self.messages[-1]})" if self.messages and self.messages[-1] not in problem else ""
         return f"{self.name} ({self.facts.path.name}): {problem}{said}"
 
     def address(self, name2: str, name3: str) -> int:
-        """Address of a function of the library, by its name in either version."""
+        """Address of a library function, by its name in either version."""
         function = getattr(self._fmu.dll, name2 if self.version == 2 else name3)
         return ctypes.cast(function, ctypes.c_void_p).value or 0
 
     def start(self, parameters: Mapping[str, Any], inputs: Mapping[int, float], time: float) -> None:
-        """Bring the instance to the start of a run: reset if it has run before, set parameters, initialise.
-
-        Args:
-            parameters: by the FMU's names.
-            inputs: start values of real inputs by value reference.
-            time: start time [s].
+        """Reset if necessary, set parameters, inputs by value reference and time [s], and initialise.
 
         Raises:
-            UnknownName: a parameter that is not there.
+            UnknownName: no such parameter.
             InstanceFailed: the FMU refuses.
         """
         self.messages.clear()
@@ -152,7 +140,7 @@ class Instance:
         """Set a parameter or input before initialisation, converted to its type.
 
         Raises:
-            UnknownName, InputError: no such parameter, or a value that is not of its type.
+            UnknownName, InputError: no such parameter, or a value of the wrong type.
         """
         variable = self.facts.settable(name)
         converted = values_of(variable, value, self.name)
@@ -164,17 +152,17 @@ class Instance:
         getattr(self._fmu, f"set{type_}")(references, values)
 
     def do_step(self, time: float, step: float) -> float | None:
-        """One step through fmpy, outside the loop. Returns the time at which the FMU asks to end, or None.
+        """Do a step outside the loop. Returns the time at which the FMU ends the run, or None.
 
         Raises:
-            InstanceFailed: it returned early although that was not allowed.
-            Exception: fmpy's, with the status it returned.
+            InstanceFailed: it returned early without permission.
+            Exception: fmpy's, with the status.
         """
         try:
             flags = self._fmu.doStep(time, step)
         except Exception as error:
             if self.version == 2 and getattr(error, "status", 0) == DISCARD and self._terminated():
-                return float(self._fmu.getRealStatus(LAST_SUCCESSFUL_TIME))
+                return float(self._fmu.getRealStatus(2))  # fmi2LastSuccessfulTime
             raise
         if self.version == 2:
             return None
@@ -183,9 +171,8 @@ class Instance:
         return float(flags[3]) if flags[1] else None
 
     def _terminated(self) -> bool:
-        """Whether an FMI 2 instance that discarded a step wants to end."""
         try:
-            return bool(self._fmu.getBooleanStatus(TERMINATED))
+            return bool(self._fmu.getBooleanStatus(3))  # fmi2Terminated
         except Exception:
             return False
 
@@ -196,17 +183,17 @@ class Instance:
         return list(getter(references) if self.version == 2 else getter(references, nValues=count))
 
     def save(self, slot: str = "main") -> None:
-        """Keep the present state under a name, reusing the memory of the last one."""
+        """Save the state under a name, reusing its memory."""
         name = "fmi2GetFMUstate" if self.version == 2 else "fmi3GetFMUState"
         getattr(self._fmu, name)(self._fmu.component, ctypes.byref(self._states.setdefault(slot, ctypes.c_void_p())))
 
     def restore(self, slot: str = "main") -> None:
-        """Return to a kept state."""
+        """Restore a saved state."""
         name = "fmi2SetFMUstate" if self.version == 2 else "fmi3SetFMUState"
         getattr(self._fmu, name)(self._fmu.component, self._states[slot])
 
     def forget(self) -> None:
-        """Free kept states. One that the FMU does not take back is left to it."""
+        """Free saved states, ignoring failures."""
         name = "fmi2FreeFMUstate" if self.version == 2 else "fmi3FreeFMUState"
         for state in self._states.values():
             with suppress(Exception):
@@ -214,7 +201,7 @@ class Instance:
         self._states.clear()
 
     def end(self) -> None:
-        """Say that the run is over, as the standard asks before `close`.
+        """Terminate the run, as required before `close`.
 
         Raises:
             InstanceFailed: the FMU refuses.

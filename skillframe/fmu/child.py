@@ -1,7 +1,7 @@
-"""A child process that holds one foreign FMU, and what is said when it crashes, hangs or runs out of memory.
+"""A child process with one foreign FMU, and reports of its crash, hang or lack of memory.
 
-Messages are bytes over a socket (`channel`): one letter, then doubles or JSON; nothing is unpickled. What comes back
-is taken for the FMU's own word: it has a deadline, a largest length, and is checked before it is used.
+Messages are one letter with doubles or JSON; nothing is unpickled. A head of token, number and length reveals stray or
+forged bytes. Answers are untrusted and checked.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import shutil
 import signal
 import site
 import socket
+import struct
 import subprocess
 import sys
 import tempfile
@@ -24,28 +25,80 @@ from typing import Any
 
 from skillframe.errors import InputError, SkillframeError, need
 from skillframe.fmu.bindings import InstanceFailed
-from skillframe.fmu.channel import Channel, Garbled
 from skillframe.fmu.confine import EVERYTHING
+
+HEAD = struct.Struct("<QII")
+
+
+class Garbled(Exception):
+    """Received bytes are no message of this channel."""
+
+
+class Channel:
+    """One end of a channel: a connected stream socket and a shared number below 2**64."""
+
+    def __init__(self, end: socket.socket, token: int) -> None:
+        self.end, self._token = end, token
+        self._sent = self._taken = 0
+        self._rest = b""
+
+    def send(self, message: bytes, limit_s: float | None = None) -> None:
+        """Send a message within a time. Raises OSError if the other end is gone or does not read."""
+        self.end.settimeout(limit_s)
+        self._sent = (self._sent + 1) & 0xFFFFFFFF
+        self.end.sendall(HEAD.pack(self._token, self._sent, len(message)) + message)
+
+    def receive(self, most: int, until: float | None = None) -> bytes:
+        """Next message of at most `most` bytes, until a time of the monotonic clock.
+
+        Raises:
+            TimeoutError, EOFError, OSError: too late, or closed.
+            Garbled: no message, or too long.
+        """
+        data = self._filled(self._rest, HEAD.size, until)
+        token, number, length = HEAD.unpack_from(data)
+        self._taken = (self._taken + 1) & 0xFFFFFFFF
+        if token != self._token or number != self._taken:
+            raise Garbled("stray bytes")
+        if length > most:
+            raise Garbled(f"a message of {length} bytes, where {most} are the most")
+        end = HEAD.size + length
+        data = self._filled(data, end, until)
+        self._rest = data[end:]
+        return data[HEAD.size : end]
+
+    def _filled(self, data: bytes, size: int, until: float | None) -> bytes:
+        if len(data) >= size:
+            return data
+        parts, have = [data], len(data)
+        while have < size:
+            if until is not None:
+                self.end.settimeout(max(1e-6, until - monotonic()))
+            part = self.end.recv(1 << 16)
+            if not part:
+                raise EOFError
+            parts.append(part)
+            have += len(part)
+        return b"".join(parts)
+
+    def close(self) -> None:
+        """Close this end."""
+        self.end.close()
+
 
 try:
     import resource
 except ModuleNotFoundError:  # Windows
     CONFINES = False
 else:
-    CONFINES = hasattr(os, "waitid")  # macOS has it from Python 3.13 on
+    CONFINES = hasattr(os, "waitid")  # macOS from Python 3.13
 
-TELLING = 0.25
-"""Share of the memory allowed from which on a crash is told with it; below, the same crash has the same words."""
 HANDED_ON = ("PATH", "LANG", "LC_ALL", "LC_CTYPE", "TZ", "LD_LIBRARY_PATH", "PYTHONPATH", "PYTHONHOME")
-"""All that a child is told of our environment; the rest may hold secrets."""
+"""Environment passed on; the rest may hold secrets."""
 LONGEST = 16 * 1024**2
-"""Bytes of an answer, unless the caller expects less: a row of 100,000 outputs needs a few million."""
+"""Largest answer in bytes; a row of 100,000 outputs needs a few million."""
 SAID = 1000
-"""Characters of a sentence of the FMU."""
-LEAVING_S = 2.0
-"""For a child to end after it has closed its end of the socket."""
-ENDING_S = 10.0
-"""For the keeper to end all that there is; after that it is killed, and takes the child with it where Linux does."""
+"""Largest message of the FMU in characters."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -54,8 +107,8 @@ class SandboxLimits:
 
     Attributes:
         memory_bytes: address space; disk_bytes: a file's size, and all files where the folder is in memory.
-        start_s, step_s: wall time to load and start, and of a step [s].
-        use: what of the system's confinement to ask for (`confine`); less is for tests.
+        start_s, step_s: wall time of start and step [s].
+        use: parts of the system's confinement (`confine`).
     """
 
     memory_bytes: int = 2 * 1024**3
@@ -66,15 +119,15 @@ class SandboxLimits:
 
 
 class ChildLost(SkillframeError):
-    """A child process crashed, hung or left. The sentence says which, and how much memory it used."""
+    """A child process crashed, hung or left."""
 
 
 class Child:
     """One child process and its end of the socket.
 
     Raises:
-        InputError: the system has no limits to run an FMU under.
-        MissingDependency: fmpy, which the child needs, is not installed.
+        InputError: the system lacks limits for FMUs.
+        MissingDependency: fmpy is not installed.
     """
 
     def __init__(self, path: Path, name: str, limits: SandboxLimits) -> None:
@@ -97,23 +150,23 @@ class Child:
             )  # fmt: skip
         finally:
             theirs.close()
-        # Up to its exec a child shares our memory, and Linux counts that peak as the child's own.
+        # Until exec the child shares this process's memory, which counts in its peak.
         self._inherited_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         self._channel = Channel(ours, token)
         self._asked = monotonic()
 
     def send(self, letter: bytes, payload: bytes = b"") -> None:
-        """Send a request. A child that has gone or does not read is found out by `receive`."""
+        """Send a request. `receive` reports a lost child."""
         self._asked = monotonic()
         with suppress(OSError):
             self._channel.send(letter + payload, self.limits.start_s)
 
     def receive(self, limit_s: float, what: str, most: int = LONGEST) -> bytes:
-        """The child's answer of `most` bytes at most, within a time from when it was last asked or answered.
+        """Answer of at most `most` bytes, within a time from the last message.
 
         Raises:
-            ChildLost: it crashed, did not answer in time, or answered with what is no answer.
-            InstanceFailed, InputError: it answered with a problem.
+            ChildLost: it crashed, was late, or answered nonsense.
+            InstanceFailed, InputError: it reported a problem.
         """
         until = self._asked + limit_s
         try:
@@ -128,32 +181,29 @@ class Child:
             raise ChildLost(f"{self._who()} {self._death(until)} while {what}") from None
         if answer[:1] == b".":
             return answer[1:]
-        raise self._problem(answer, what)
-
-    def _problem(self, answer: bytes, what: str) -> SkillframeError:
         if answer[:1] == b"!":
-            return InstanceFailed(plain(answer[1:]))
+            raise InstanceFailed(plain(answer[1:]))
         with suppress(ValueError):
             if answer[:1] == b"?" and len(words := json.loads(answer[1:])) == 3:
-                return InputError(*(plain(str(word).encode()) for word in words))
-        return self.liar("an answer of no known kind", what)
+                raise InputError(*(plain(str(word).encode()) for word in words))
+        raise self.liar("an answer of no known kind", what)
 
     def liar(self, sent: str, what: str) -> ChildLost:
-        """End a child that sent what is no answer. Returns the error to raise."""
+        """Kill a child that sent an invalid answer, and return the error."""
         self.kill()
         return ChildLost(f"{self._who()} sent {sent} instead of an answer while {what}; it was stopped")
 
     def tell(self, letter: bytes, value: Any) -> None:
-        """A request with a JSON payload."""
+        """Send a request with a JSON payload."""
         self.send(letter, json.dumps(value).encode())
 
     def ask(self, letter: bytes, value: Any, limit_s: float, what: str, most: int = LONGEST) -> Any:
-        """A request and its answer, both JSON. Raises as `receive`."""
+        """Send a request and return its answer, both JSON. Raises as `receive`."""
         self.tell(letter, value)
         return self.heard(limit_s, what, most)
 
     def heard(self, limit_s: float, what: str, most: int = LONGEST) -> Any:
-        """An answer in JSON. Raises as `receive`."""
+        """Return an answer in JSON. Raises as `receive`."""
         answer = self.receive(limit_s, what, most)
         try:
             return json.loads(answer) if answer else None
@@ -164,15 +214,17 @@ class Child:
         return f"{self.name} ({self.path.name})"
 
     def _death(self, until: float) -> str:
-        """In words how the child ended, with the most memory it held if that may be why."""
-        if self._waited(max(LEAVING_S, until - monotonic())) is None:
+        if self._waited(max(2.0, until - monotonic())) is None:  # s, to end after it has closed its socket
             self.kill()
             return "closed its end of the pipe and was stopped"
         code = self._process.returncode
         self.kill()
         memory = f"having used {self._peak_kb // 1024} MB of {self.limits.memory_bytes // 1024**2} MB"
+        if code == -signal.SIGXCPU:
+            return "took more processor time than it may"
         if code < 0:
-            large = self._peak_kb > max(TELLING * self.limits.memory_bytes / 1024, self._inherited_kb)
+            worth_telling = 0.25 * self.limits.memory_bytes / 1024
+            large = self._peak_kb > max(worth_telling, self._inherited_kb)
             name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
             return f"crashed ({name}{', ' + memory if large else ''})"
         return f"ran out of memory ({memory})" if code == 12 else f"left with code {code}"
@@ -180,7 +232,6 @@ class Child:
     _peak_kb = 0
 
     def _waited(self, limit_s: float) -> int | None:
-        """Exit code of the keeper, which is the worker's, within a time, or None if it is still there."""
         until, pause = monotonic() + limit_s, 0.0005
         while self._process.returncode is None:
             try:
@@ -198,16 +249,16 @@ class Child:
         return self._process.returncode
 
     def release(self) -> None:
-        """Let the keeper end the child and all it has started, without waiting for it."""
+        """Let the keeper end all processes, without waiting."""
         assert self._process.stdin is not None
         with suppress(OSError):
             self._process.stdin.close()
         self._channel.close()
 
     def kill(self) -> None:
-        """End the child at once, and what its FMU has started."""
+        """End the child and its FMU's processes at once."""
         self.release()
-        if self._waited(ENDING_S) is None:
+        if self._waited(10.0) is None:  # s, to end all processes before it is killed
             with suppress(ProcessLookupError, PermissionError):
                 os.killpg(self._process.pid, signal.SIGKILL)
             self._process.wait()
@@ -217,11 +268,6 @@ class Child:
 
 
 def _private_folder() -> str:
-    """A new folder of the child's own.
-
-    Raises:
-        InputError: the system gives none.
-    """
     try:
         return tempfile.mkdtemp(prefix="skillframe-fmu-")
     except OSError as error:
@@ -229,7 +275,6 @@ def _private_folder() -> str:
 
 
 def _environment(folder: str) -> dict[str, str]:
-    """What a child is told: where programs and libraries are, the language, and its own folder as home."""
     caches = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     handed = {name: os.environ[name] for name in HANDED_ON if name in os.environ}
     ours = {"HOME": folder, "TMPDIR": folder, "XDG_CACHE_HOME": caches, "PYTHONUSERBASE": site.getuserbase()}
@@ -238,6 +283,6 @@ def _environment(folder: str) -> dict[str, str]:
 
 
 def plain(text: bytes) -> str:
-    """What a child says as one line of characters that can be printed, not too long."""
+    """Text of a child as one printable line of limited length."""
     words = " ".join(text[: 4 * SAID].decode("utf-8", "replace").split())
     return "".join(c if c.isprintable() else "?" for c in words)[:SAID]

@@ -1,11 +1,8 @@
-"""What Linux offers to confine a process that runs foreign code, asked for by system call. Each part may be missing.
+"""Confinement of processes with foreign code on Linux. Each part may be missing.
 
-- A user and process namespace (namespaces(7)): the FMU sees no process but its own, and the kernel ends all of them
-  with the first one.
-- Landlock (landlock(7), Linux 5.13): files are written below one folder only; from 6.12 signals stay inside too.
-- A folder in memory of limited size, so that a full disk is not reached.
-
-Other systems have none of these: there the limits of `setrlimit` and the process group remain.
+- A user and process namespace (namespaces(7)): the FMU sees only its processes, which end with the first one.
+- Landlock (landlock(7), Linux 5.13): writes only below one folder; from 6.12 signals stay inside too.
+- A folder in memory of limited size.
 """
 
 from __future__ import annotations
@@ -23,7 +20,7 @@ EVERYTHING = (NAMESPACE, LANDLOCK, MEMORY_FOLDER, SUBREAPER)
 
 _NEWNS, _NEWUSER, _NEWPID = 0x00020000, 0x10000000, 0x20000000
 _PDEATHSIG, _DUMPABLE, _SUBREAPER, _NO_NEW_PRIVS = 1, 4, 36, 38
-_CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446  # one number on every architecture since Linux 5.13
+_CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446  # same number on every architecture
 _WRITE_FILE, _TRUNCATE = 1 << 1, 1 << 14
 _MAKE_AND_REMOVE = sum(1 << bit for bit in range(4, 13))
 _REFER = 1 << 13
@@ -32,11 +29,6 @@ _NOSUID, _NODEV = 2, 4
 
 
 def _call(name: str, *arguments: object) -> int:
-    """A function of the C library.
-
-    Raises:
-        OSError: it failed, or is not there.
-    """
     if sys.platform != "linux":
         raise OSError("Linux only")
     function = getattr(ctypes.CDLL(None, use_errno=True), name, None)
@@ -49,7 +41,7 @@ def _call(name: str, *arguments: object) -> int:
 
 
 def own_namespaces() -> bool:
-    """From now on children of this process live in a process namespace. It stays outside itself. False if refused."""
+    """Put future children of this process into a new process namespace. False if refused."""
     user, group = os.getuid(), os.getgid()
     try:
         _call("unshare", _NEWUSER | _NEWPID)
@@ -61,7 +53,7 @@ def own_namespaces() -> bool:
 
 
 def memory_folder(folder: str, size_bytes: int) -> bool:
-    """Put a file system in memory over a folder, for this process and its children only. False if refused."""
+    """Mount a file system in memory on a folder for this process and its children. False if refused."""
     with suppress(OSError):
         _call("unshare", _NEWNS)
         data = f"size={size_bytes},nr_inodes=10000,mode=0700".encode()
@@ -71,17 +63,17 @@ def memory_folder(folder: str, size_bytes: int) -> bool:
 
 
 def landlock_version() -> int:
-    """Version of Landlock that the kernel has, 0 for none."""
+    """Landlock version of the kernel, or 0."""
     with suppress(OSError):
         return _call("syscall", _CREATE_RULESET, None, ctypes.c_size_t(0), 1)
     return 0
 
 
 def write_only_below(folder: str) -> int:
-    """Let this process and its children write files below one folder only, for good.
+    """Restrict writes of this process and its children to one folder.
 
     Returns:
-        The version of Landlock that does it, 0 where there is none.
+        The Landlock version, or 0.
     """
     version = landlock_version()
     if version < 1:
@@ -109,19 +101,19 @@ def _add_rule(rules: int, path: str, rights: int) -> None:
 
 
 def die_with_parent() -> None:
-    """This process is killed when the thread that made it ends (Linux)."""
+    """Kill this process when its parent thread ends (Linux)."""
     with suppress(OSError):
         _call("prctl", _PDEATHSIG, int(signal.SIGKILL), 0, 0, 0)
 
 
 def hide_memory() -> None:
-    """No other process may look into this one (Linux)."""
+    """Hide this process's memory from others (Linux)."""
     with suppress(OSError):
         _call("prctl", _DUMPABLE, 0, 0, 0, 0)
 
 
 def adopt_orphans() -> bool:
-    """Processes below this one whose parents have gone become its children (Linux). Returns False where refused."""
+    """Adopt orphaned descendants (Linux). False if refused."""
     with suppress(OSError):
         _call("prctl", _SUBREAPER, 1, 0, 0, 0)
         return True
@@ -129,7 +121,7 @@ def adopt_orphans() -> bool:
 
 
 def descendants(root: int) -> list[int]:
-    """Processes below one that are not ended, in any session (Linux; elsewhere none are found)."""
+    """Running descendants of a process, in any session (Linux only)."""
     below: dict[int, list[int]] = {}
     for entry in Path("/proc").glob("[0-9]*"):
         with suppress(OSError, ValueError, IndexError):

@@ -1,135 +1,31 @@
-"""What an FMU is and can do, read from its file without loading any of its code.
+"""Facts and validation of FMU files without loading their code.
 
-A file that is not trusted is read in a child process under limits: its description may be made to take all time and
-memory. What comes back is as small as what is used of it.
+Untrusted files are read in a child under limits, because a description may exhaust time and memory.
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 from functools import lru_cache
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from skillframe.errors import InputError, UnknownName
-from skillframe.fmu.allow import is_allowed
-from skillframe.fmu.extract import content_hash, description_folder, member_names
+from skillframe.errors import InputError
+from skillframe.fmu.child import Child, ChildLost, SandboxLimits
+from skillframe.fmu.extract import content_hash, description_folder, is_allowed, member_names
+from skillframe.fmu.facts import FmuFacts, FmuVariable
 
-FLOATS = ("Real", "Float64")
-MOST_VARIABLES = 100_000
-LONGEST_FACTS = 64 * 1024**2  # bytes of the facts of one FMU
-READING_S = 60.0
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FmuVariable:
-    """A variable of an FMU.
-
-    Attributes:
-        name, reference: its name and value reference; type: "Real", "Float64", "Boolean" ...
-        causality: "input", "output", "parameter" ...; size: number of scalars (FMI 3 arrays).
-        start: as written in the model description, or None; unit, text: unit and what it is, or "".
-    """
-
-    name: str
-    reference: int
-    type: str
-    causality: str
-    size: int = 1
-    start: str | None = None
-    unit: str = ""
-    text: str = ""
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class FmuFacts:
-    """What the file says.
-
-    Attributes:
-        path, digest: the file and the SHA-256 of its content.
-        fmi_version: "2.0", "3.0" ...; name: the model's name.
-        kinds: of "co_simulation", "model_exchange", "scheduled_execution".
-        platforms: folders of binaries inside that hold a library of the model; has_sources: carries C sources.
-        runs_here: one of the platforms is this machine's.
-        saves_state, serializes_state, variable_step, input_derivatives: claimed capabilities of co-simulation.
-        variables: by name; locals are left out of what is read in a child.
-        token, identifier, needs_tool: what instantiation takes, the library's name, whether its maker's tool is needed.
-        source_files, definitions: C sources of co-simulation and compiler options, as listed.
-    """
-
-    path: Path
-    digest: str
-    fmi_version: str
-    name: str
-    kinds: tuple[str, ...]
-    platforms: tuple[str, ...]
-    has_sources: bool
-    runs_here: bool
-    saves_state: bool
-    serializes_state: bool
-    variable_step: bool
-    input_derivatives: bool
-    variables: dict[str, FmuVariable]
-    token: str = ""
-    identifier: str = ""
-    needs_tool: bool = False
-    source_files: tuple[str, ...] = ()
-    definitions: tuple[str, ...] = ()
-
-    def names(self, causality: str) -> list[str]:
-        """Names of the variables of a causality, in the file's order."""
-        return [v.name for v in self.variables.values() if v.causality == causality]
-
-    def variable(self, name: str, causality: str, what: str = "") -> FmuVariable:
-        """The variable of a name.
-
-        Raises:
-            UnknownName: there is none, or it is not of that causality; suggests the nearest.
-        """
-        found = self.variables.get(name)
-        if found is None or found.causality != causality:
-            note = what or (f"{name!r} is there as {found.causality}" if found else "")
-            raise UnknownName(f"{causality} of {self.path.name}", name, self.names(causality), note)
-        return found
-
-    def settable(self, name: str) -> FmuVariable:
-        """The parameter or input of a name. Raises `UnknownName` as `variable` does."""
-        found = self.variables.get(name)
-        if found is not None and found.causality in ("parameter", "input"):
-            return found
-        note = f"{name!r} is there as {found.causality}" if found else ""
-        known = [*self.names("input"), *self.names("parameter")]
-        raise UnknownName(f"parameter or input of {self.path.name}", name, known, note)
-
-    def require_runnable(self) -> None:
-        """Refuse what cannot be driven here, saying what is inside.
-
-        Raises:
-            InputError: no co-simulation, or no binary for this machine.
-        """
-        if "co_simulation" not in self.kinds:
-            inside = " and ".join(self.kinds) + " only" if self.kinds else "no interface that can be run"
-            raise InputError(self.path, f"holds {inside}", "export it as co-simulation")
-        if self.runs_here:
-            return
-        from fmpy import platform, platform_tuple
-
-        here = platform if self.fmi_version.startswith("2") else platform_tuple
-        inside = f"holds binaries for {', '.join(self.platforms)}" if self.platforms else "holds no binaries"
-        if self.has_sources:
-            fix = f"it carries C sources: type skillframe fmu build {self.path}"
-        else:
-            fix = f"and no sources; ask its maker for {here} or for sources"
-        raise InputError(self.path, f"{inside}, this machine is {here}", fix)
+READING_S, WAITING_S = 60, 900.0
+"""Processor and wall time for a description [s]."""
 
 
 def inspect_fmu(path: Path) -> FmuFacts:
-    """Facts of an FMU file. One that is not allowed inside this process is read in a child.
+    """Facts of an FMU file, read in a child if untrusted.
 
     Raises:
-        InputError: not an FMU, one that would escape its folder, or a model description that cannot be read.
-        ChildLost: reading it took more time or memory than it may.
+        InputError: not an FMU, an unsafe one, or an invalid model description.
+        ChildLost: time or memory exceeded.
     """
     path, digest = path.resolve(), content_hash(path)
     known = _KNOWN.get((path, digest))
@@ -143,25 +39,24 @@ _KNOWN: dict[tuple[Path, str], FmuFacts] = {}
 
 
 def _asked(path: Path, letter: bytes) -> Any:
-    """An answer about a description from a child that has loaded nothing of the FMU."""
-    from skillframe.fmu.child import Child, SandboxLimits
-
     limits = SandboxLimits()
     child = Child(path, path.stem, limits)
     try:
-        return child.ask(letter, {"path": str(path)}, READING_S, "its description was read", LONGEST_FACTS)
+        given = {"path": str(path), "processor_s": READING_S}
+        most_bytes = 64 * 1024**2
+        return child.ask(letter, given, WAITING_S, "its description was read", most_bytes)
     finally:
         child.close()
 
 
 def describe_here(facts: FmuFacts) -> dict[str, Any]:
-    """Facts as plain values, without the path and without variables that no one can set or read by name."""
+    """Facts as plain values, without path and inaccessible variables."""
     told = {name: v for name, v in facts.variables.items() if v.causality in ("input", "output", "parameter")}
     return {**asdict(replace(facts, variables=told)), "path": ""}
 
 
 def facts_from(given: dict[str, Any], path: Path) -> FmuFacts:
-    """Facts out of `describe_here`. `inspect_fmu` keeps them for this process."""
+    """Facts from `describe_here`, cached for `inspect_fmu`."""
     lists = {name: tuple(given[name]) for name in ("kinds", "platforms", "source_files", "definitions")}
     variables = {name: FmuVariable(**v) for name, v in given["variables"].items()}
     facts = FmuFacts(**{**given, **lists, "path": path, "variables": variables})
@@ -170,7 +65,7 @@ def facts_from(given: dict[str, Any], path: Path) -> FmuFacts:
 
 
 def inspect_here(path: Path) -> FmuFacts:
-    """As `inspect_fmu`, in this process.
+    """`inspect_fmu` in this process.
 
     Raises:
         InputError: as `inspect_fmu`.
@@ -193,7 +88,15 @@ def _inspect(path: Path, digest: str) -> FmuFacts:
             problem = f"has the model identifier {kind.modelIdentifier!r}, which is no name of a file"
             raise InputError(path, problem, "do not trust this file" if kind.modelIdentifier else "export it again")
     files, definitions = _sources(description, cs.modelIdentifier if cs else "")
-    platforms = _platforms(names, first.modelIdentifier if first is not None else "")
+    identifier = first.modelIdentifier if first is not None else ""
+    found = {
+        p.parts[1] for p in map(PurePosixPath, names)
+        if len(p.parts) == 3 and p.parts[0] == "binaries" and p.stem == identifier
+        and p.suffix in (".so", ".dll", ".dylib")
+    }  # fmt: skip
+    platforms = tuple(sorted(found))
+    from fmpy import platform, platform_tuple
+
     return FmuFacts(
         path=path,
         digest=digest,
@@ -202,7 +105,7 @@ def _inspect(path: Path, digest: str) -> FmuFacts:
         kinds=tuple(kind for kind, there in kinds.items() if there is not None),
         platforms=platforms,
         has_sources=any(PurePosixPath(n).parts[0] == "sources" and n.endswith((".c", ".cpp")) for n in names),
-        runs_here=_here(description.fmiVersion) in platforms,
+        runs_here=str(platform if description.fmiVersion.startswith("2") else platform_tuple) in platforms,
         saves_state=bool(cs and cs.canGetAndSetFMUstate),
         serializes_state=bool(cs and cs.canSerializeFMUstate),
         variable_step=bool(cs and cs.canHandleVariableCommunicationStepSize),
@@ -217,12 +120,12 @@ def _inspect(path: Path, digest: str) -> FmuFacts:
 
 
 def read_description(path: Path) -> Any:
-    """The model description as fmpy reads it, without its strict validation (`problems_of` does that).
+    """Model description by fmpy, without strict validation.
 
     Raises:
-        InputError: the XML cannot be read, or is of FMI 1.
+        InputError: invalid XML, or FMI 1.
     """
-    with description_folder(path, MOST_VARIABLES) as folder:
+    with description_folder(path, 100_000) as folder:  # most variables
         try:
             description = _read(folder, validate=False)
         except Exception as error:
@@ -244,11 +147,10 @@ def _read(folder: Path, validate: bool) -> Any:
 
 
 def _why(folder: Path, error: Exception) -> str:
-    """What is wrong with a description, in the words of the XML reader or of the standard's schema."""
     from fmpy.model_description import ValidationError
     from lxml.etree import LxmlError  # type: ignore[import-untyped]
 
-    if isinstance(error, OSError):  # lxml's, for bytes of another encoding
+    if isinstance(error, OSError):
         return "its text is not in the encoding that it names"
     if isinstance(error, LxmlError | ValidationError) or type(error) is Exception:
         return _line(error)
@@ -261,38 +163,34 @@ def _why(folder: Path, error: Exception) -> str:
     return "it is not built as the standard says, or names no version of it"
 
 
-def problems_of(path: Path) -> list[str]:
-    """As `judge_here`, in a child where the file is not trusted.
-
-    Raises:
-        ChildLost: it took more time or memory than it may.
-    """
-    return judge_here(path) if is_allowed(path) else [str(problem) for problem in _asked(path, b"j")]
+def problems_of(path: Path) -> tuple[list[str], str]:
+    """Result of `judge_here`, in a child if untrusted, and why it failed, or ""."""
+    if is_allowed(path):
+        return judge_here(path), ""
+    try:
+        return [str(problem) for problem in _asked(path, b"j")], ""
+    except ChildLost as lost:
+        return [], f"not validated: {lost}"
 
 
 def judge_here(path: Path) -> list[str]:
-    """What fmpy's validation finds: schema, names, structure, units, start values.
+    """Problems found by fmpy: schema, names, structure, units, start values.
 
-    An alias of FMI 3 shares the entries of its variable; fmpy 0.3 asks for entries of its own, which is left out here.
+    Findings about aliases in FMI 3 are dropped: they share their variable's entry, which fmpy 0.3 ignores.
     """
     from fmpy.validation import validate_fmu
 
     found = [" ".join(str(problem).split()) for problem in validate_fmu(str(path))]
-    return [problem for problem in found if problem not in _asked_of_aliases(path)]
-
-
-def _asked_of_aliases(path: Path) -> set[str]:
-    """What fmpy says where every initial unknown is there, and only their aliases have no entry."""
     description = read_description(path)
     there = {unknown.variable.name for unknown in description.initialUnknowns}
     shared = {v.name for v in description.modelVariables if v.alias is not None and v.alias.name in there}
     expected, actual = (", ".join(sorted(names)) for names in (there | shared, there))
     where = "ModelStructure/InitialUnknowns does not contain the expected set of variables."
-    return {f"{where} Expected {{{expected}}} but was {{{actual}}}."} if shared else set()
+    of_aliases = f"{where} Expected {{{expected}}} but was {{{actual}}}."
+    return [problem for problem in found if not shared or problem != of_aliases]
 
 
 def _sources(description: Any, identifier: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Source files, definitions and include folders as listed (fmpy reads both versions' lists)."""
     files: list[str] = []
     options: list[str] = []
     for configuration in getattr(description, "buildConfigurations", []):
@@ -307,21 +205,6 @@ def _sources(description: Any, identifier: str) -> tuple[tuple[str, ...], tuple[
 
 def _line(error: Exception) -> str:
     return " ".join(str(error).split())[:300]
-
-
-def _here(version: str) -> str:
-    from fmpy import platform, platform_tuple
-
-    return str(platform if version.startswith("2") else platform_tuple)
-
-
-def _platforms(names: list[str], identifier: str) -> tuple[str, ...]:
-    found = {
-        p.parts[1] for p in map(PurePosixPath, names)
-        if len(p.parts) == 3 and p.parts[0] == "binaries" and p.stem == identifier
-        and p.suffix in (".so", ".dll", ".dylib")
-    }  # fmt: skip
-    return tuple(sorted(found))
 
 
 def _variable(v: Any) -> FmuVariable:

@@ -1,11 +1,10 @@
-"""Between skillframe and a worker: holds the worker's processes, and ends all of them. Started as a module.
+"""Keeper process, which starts a worker and ends all its processes.
 
-The keeper runs no foreign code. Its standard input is a pipe whose other end only skillframe holds: when that closes,
-by intent or because skillframe was killed, the keeper ends the worker and everything below it, removes the private
-folder, and leaves. When the worker ends, it does the same and ends as the worker did.
+When the pipe on standard input closes or the worker ends, it kills the worker's descendants, removes the private folder
+and exits.
 
     skillframe -> keeper -> first process of the namespace, reaps
-                         -> worker, runs the FMU -> what the FMU starts
+                         -> worker, runs the FMU -> its children
 """
 
 from __future__ import annotations
@@ -23,25 +22,27 @@ from typing import Any, NoReturn
 
 from skillframe.fmu import confine
 
-with suppress(ModuleNotFoundError):  # Windows, where `Child` starts no keeper
+with suppress(ModuleNotFoundError):
     import fcntl
     import resource
 
 HIGH = 20_000
-"""Descriptor of the worker's socket, where the system allows as many: what an FMU writes to small numbers misses it."""
-OPEN = 512
-"""Most open files of a worker; also what an FMU is told if it asks how many there can be."""
+"""Descriptor of the worker's socket, out of an FMU's reach."""
 PATIENCE_S = 5.0
-"""For the last descendant to go, where there is no namespace."""
+"""Time for the last descendant to end without a namespace."""
 
 
 def keep(given: dict[str, Any]) -> NoReturn:
-    """Start the worker, wait for its end or ours. `given` is what `Child` wrote."""
+    """Run the worker until it or skillframe ends. `given` comes from `Child`."""
     use = set(given["use"])
     confined: dict[str, Any] = {"namespace": confine.NAMESPACE in use and confine.own_namespaces()}
     reaper = _first(given["fd"]) if confined["namespace"] else 0
     confined["subreaper"] = not reaper and confine.SUBREAPER in use and confine.adopt_orphans()
-    wake = _waker()
+    wake, write = os.pipe()
+    os.set_blocking(wake, False)
+    os.set_blocking(write, False)
+    signal.signal(signal.SIGCHLD, lambda *_: None)
+    signal.set_wakeup_fd(write, warn_on_full_buffer=False)
     worker = os.fork()
     if worker == 0:
         _become_worker(given, confined)
@@ -50,13 +51,19 @@ def keep(given: dict[str, Any]) -> NoReturn:
     _wait(worker, wake)
     status = _end_all(reaper, worker)
     shutil.rmtree(given["folder"], ignore_errors=True)
-    _leave_as(status)
+    code = os.waitstatus_to_exitcode(status)
+    if code < 0:
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        with suppress(OSError, ValueError):
+            signal.signal(-code, signal.SIG_DFL)
+        os.kill(os.getpid(), -code)
+    os._exit(code & 0xFF)
 
 
 def _first(fd: int) -> int:
-    """The first process of the namespace: it reaps what is left to it, and with it all others end.
+    """First process of the namespace, with which all others end.
 
-    It holds neither our input nor the worker's socket `fd`, whose end would not be seen otherwise.
+    It closes standard input and the socket `fd`, so that their end is seen.
     """
     pid = os.fork()
     if pid:
@@ -70,18 +77,7 @@ def _first(fd: int) -> int:
         signal.pause()
 
 
-def _waker() -> int:
-    """A descriptor that can be read when a child ends."""
-    read, write = os.pipe()
-    os.set_blocking(read, False)
-    os.set_blocking(write, False)
-    signal.signal(signal.SIGCHLD, lambda *_: None)
-    signal.set_wakeup_fd(write, warn_on_full_buffer=False)
-    return read
-
-
 def _wait(worker: int, wake: int) -> None:
-    """Return when the worker has ended, or skillframe has closed its end."""
     poll = select.poll()
     poll.register(0, select.POLLIN)
     poll.register(wake, select.POLLIN)
@@ -93,14 +89,13 @@ def _wait(worker: int, wake: int) -> None:
 
 
 def _end_all(reaper: int, worker: int) -> int:
-    """Kill the worker, its group, and whatever it has started, until nothing is left. Returns its wait status."""
     for kill, pid in ((os.kill, reaper), (os.killpg, worker), (os.kill, worker)):
         with suppress(OSError):
             if pid:
                 kill(pid, signal.SIGKILL)
     status = os.waitpid(worker, 0)[1]
     if reaper:
-        os.waitpid(reaper, 0)  # the kernel has ended the namespace by then
+        os.waitpid(reaper, 0)
         return status
     until = time.monotonic() + PATIENCE_S
     while time.monotonic() < until:
@@ -111,24 +106,12 @@ def _end_all(reaper: int, worker: int) -> int:
             while os.waitpid(-1, os.WNOHANG)[0]:
                 pass
         except ChildProcessError:
-            break  # none is left: a list may miss one that loses its parent meanwhile, and that one is our child by now
+            break  # no child is left; orphans would be children by now
         time.sleep(0.002)
     return status
 
 
-def _leave_as(status: int) -> NoReturn:
-    """End as the worker did."""
-    code = os.waitstatus_to_exitcode(status)
-    if code < 0:
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        with suppress(OSError, ValueError):
-            signal.signal(-code, signal.SIG_DFL)
-        os.kill(os.getpid(), -code)
-    os._exit(code & 0xFF)
-
-
 def _become_worker(given: dict[str, Any], confined: dict[str, Any]) -> NoReturn:
-    """Confine this process, then load what runs an FMU, and serve."""
     code = 70
     try:
         signal.set_wakeup_fd(-1)
@@ -145,18 +128,14 @@ def _become_worker(given: dict[str, Any], confined: dict[str, Any]) -> NoReturn:
         confined["landlock"] = confine.write_only_below(folder) if confine.LANDLOCK in use else 0
         _limit(resource.RLIMIT_CORE, 0)
         _limit(resource.RLIMIT_FSIZE, given["disk_bytes"])
-        _load_and_serve(end, given, confined)
+        from skillframe.fmu.child import Channel
+        from skillframe.fmu.worker import Worker
+
+        _limit(resource.RLIMIT_AS, given["memory_bytes"])
+        Worker(Channel(end, given["token"]), confined).serve()
         code = 0
     finally:
-        os._exit(code)  # an FMU's own clean-up at exit has hung before
-
-
-def _load_and_serve(end: socket.socket, given: dict[str, Any], confined: dict[str, Any]) -> None:
-    from skillframe.fmu.channel import Channel
-    from skillframe.fmu.worker import Worker
-
-    _limit(resource.RLIMIT_AS, given["memory_bytes"])
-    Worker(Channel(end, given["token"]), confined).serve()
+        os._exit(code)  # avoids hangs in an FMU's exit handlers
 
 
 def _limit(kind: int, value: int) -> None:
@@ -165,7 +144,6 @@ def _limit(kind: int, value: int) -> None:
 
 
 def _lifted(fd: int) -> int:
-    """The socket on a high descriptor. All others are closed, and 0, 1 and 2 lead nowhere."""
     most = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
     most = HIGH + 1 if most == resource.RLIM_INFINITY else min(most, HIGH + 1)
     _limit(resource.RLIMIT_NOFILE, most)
@@ -174,7 +152,7 @@ def _lifted(fd: int) -> int:
     for standard in (0, 1, 2):
         os.dup2(nowhere, standard)
     os.closerange(3, high)
-    _limit(resource.RLIMIT_NOFILE, min(OPEN, most))
+    _limit(resource.RLIMIT_NOFILE, min(512, most))  # most open files
     return high
 
 

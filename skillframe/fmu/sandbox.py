@@ -1,7 +1,4 @@
-"""`SandboxBank`: FMUs of other makers, each instance in its own child process with time and memory limits.
-
-A crash, a hang or a leak then ends one trial with a sentence. All children of a bank step at the same time.
-"""
+"""`SandboxBank`: foreign FMUs, each instance in a child process with time and memory limits."""
 
 from __future__ import annotations
 
@@ -15,25 +12,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.errors import SkillframeError
-from skillframe.fmu.actuator import DISCARD, LOST, OK, STATUS_TEXT, ActuatorSpec, Capabilities
+from skillframe.fmu.actuator import DISCARD, LOST, OK, STATUS_TEXT, ActuatorSpec, Capabilities, columns
 from skillframe.fmu.bindings import InstanceFailed
 from skillframe.fmu.child import Child, SandboxLimits, plain
 from skillframe.fmu.extract import unpack
-from skillframe.fmu.inspection import FmuFacts, describe_here
-from skillframe.fmu.wiring import columns, mapping
+from skillframe.fmu.facts import FmuFacts
+from skillframe.fmu.inspection import describe_here
+from skillframe.fmu.stepper import mapping
 
 LOADING = 2 * (os.cpu_count() or 1)
-"""Children that load at the same time: more of them would wait for each other and be taken for hung."""
+"""Children that load at once; more would count as hung."""
 
-LONGEST_SENTENCE = 1 << 16  # bytes of words in an answer to a start or a step
+LONGEST_SENTENCE = 1 << 16  # bytes of text in an answer
 
 
 class SandboxBank:
     """A bank of foreign FMUs (see `Actuators`), one child process per instance.
 
     Raises:
-        InputError, UnknownName: not runnable here, or a mapping that does not fit.
-        InstanceFailed, ChildLost: on `start`, an FMU that does not load or initialise.
+        InputError, UnknownName: not runnable here, or a mapping does not fit.
+        InstanceFailed, ChildLost: on `start`, an FMU does not load or initialise.
     """
 
     def __init__(
@@ -47,19 +45,19 @@ class SandboxBank:
         self.active, self.status = np.ones(self.count, np.uint8), np.zeros(self.count, np.int64)
         files = ", ".join(dict.fromkeys(fact.path.name for fact in facts))
         self.notes: tuple[str, ...] = (
-            f"{files}: in child processes (skillframe fmu check FILE --allow lets a file run inside)",
+            f"{files}: in child processes (skillframe fmu FILE --allow lets a file run inside)",
         )
         self.limits = limits or SandboxLimits()
         self._specs, self._facts = list(specs), list(facts)
         self._time = 0.0
-        self._own: list[NDArray[np.int64]] = []  # columns of `y` that each actuator has, in its answers' order
+        self._own: list[NDArray[np.int64]] = []  # columns of `y` by actuator
         for spec, fact in zip(specs, facts, strict=True):
             fact.require_runnable()
             self._own.append(np.array([self.outputs.index(name) for name in mapping(spec, fact)[1]]))
-            unpack(fact.path)  # a child can write nothing
+            unpack(fact.path)
         self._answers = [struct.Struct(f"q{len(own)}d") for own in self._own]
         self._children: list[Child | None] = [None] * self.count
-        self._held = [0] * self.count  # bytes, as each said at its last start
+        self._held = [0] * self.count  # bytes, at the last start
         self._problems: dict[int, str] = {}
         self._capabilities: dict[int, Capabilities] = {}
 
@@ -68,10 +66,9 @@ class SandboxBank:
 
     def _name(self, index: int) -> str:
         spec, facts = self._kind(index)
-        return spec.name or facts.name  # not which trial of the bank: a trial fails in the same words in any bank
+        return spec.name or facts.name  # no trial number: the same message in any bank
 
     def _ready(self, index: int) -> Child:
-        """The child of an instance. A new one if there is none or the old one uses too much memory."""
         child = self._children[index]
         if child is not None and self._held[index] <= self.limits.memory_bytes // 2:
             return child
@@ -86,70 +83,60 @@ class SandboxBank:
         return new
 
     def start(self, time: float = 0.0, parameters: Sequence[Mapping[str, Any]] | None = None) -> None:
-        """Reset every instance, load those that were lost, and initialise at `u`. See `Actuators`."""
+        """Reset, reload lost instances, and initialise at `u`. See `Actuators`."""
         self.active[:] = 1
         self.status[:] = OK
         self._problems.clear()
         self._time = time
         for first in range(0, self.count, LOADING):
             wave = range(first, min(first + LOADING, self.count))
-            fresh = [self._tell_start(i, time, parameters[i] if parameters else {}) for i in wave]
+            fresh = []
+            for i in wave:
+                before, now = self._children[i], self._ready(i)
+                own = {**self._kind(i)[0].parameters, **(parameters[i] if parameters else {})}
+                now.tell(b"s", {"time": time, "parameters": own, "u": self.u[i].tolist()})
+                fresh.append(now is not before)
             for i, new in zip(wave, fresh, strict=True):
-                self._hear_start(i, new)
+                child = self._children[i]
+                assert child is not None
+                try:
+                    if new:
+                        child.receive(self.limits.start_s, "loading")
+                    answer = child.receive(self.limits.start_s, "starting", self._most(i))
+                    if len(answer) < 8:
+                        raise child.liar(f"{len(answer)} bytes", "starting")
+                    self._held[i] = max(0, *struct.unpack_from("q", answer))
+                    self._take(i, child, answer[8:], "starting")
+                except SkillframeError as error:
+                    self._lose(i, error)
         if self._problems and not self.active.any():
             raise InstanceFailed(next(iter(self._problems.values())))
 
-    def _tell_start(self, index: int, time: float, extra: Mapping[str, Any]) -> bool:
-        """Ask an instance to start. Returns whether its child is new and has to load the FMU first."""
-        before, now = self._children[index], self._ready(index)
-        own = {**self._kind(index)[0].parameters, **extra}
-        now.tell(b"s", {"time": time, "parameters": own, "u": self.u[index].tolist()})
-        return now is not before
-
-    def _hear_start(self, index: int, new: bool) -> None:
-        child = self._children[index]
-        assert child is not None
-        try:
-            if new:
-                child.receive(self.limits.start_s, "loading")
-            answer = child.receive(self.limits.start_s, "starting", self._most(index))
-            if len(answer) < 8:
-                raise child.liar(f"{len(answer)} bytes", "starting")
-            self._held[index] = max(0, *struct.unpack_from("q", answer))
-            self._take(index, child, answer[8:], "starting")
-        except SkillframeError as error:
-            self._lose(index, error)
-
     def step(self, time: float, step: float) -> bool:
-        """Advance from `time` by `step` [s] with inputs `u`. Returns True if every active instance went well."""
+        """See `Actuators.step`."""
         self._time = time
         head = struct.pack("dd", time, step)
         running = [(i, child) for i, child in enumerate(self._children) if self.active[i] and child is not None]
         for i, child in running:
             child.send(b"t", head + self.u[i].tobytes())
-        fine = True
+        fine, what = True, f"stepping from {time:.6g} s"
         for i, child in running:
-            fine &= self._collect(i, child)
+            try:
+                answer = child.receive(self.limits.step_s, what, self._most(i))
+                fine &= self._take(i, child, answer, what)
+            except SkillframeError as error:
+                self._lose(i, error)
+                fine = False
         return fine
 
     def _most(self, index: int) -> int:
-        """Bytes of an answer: numbers and a sentence."""
         return self._answers[index % len(self._answers)].size + LONGEST_SENTENCE
 
-    def _collect(self, index: int, child: Child) -> bool:
-        what = f"stepping from {self._time:.6g} s"
-        try:
-            answer = child.receive(self.limits.step_s, what, self._most(index))
-            return self._take(index, child, answer, what)
-        except SkillframeError as error:
-            self._lose(index, error)
-            return False
-
     def _take(self, index: int, child: Child, answer: bytes, what: str) -> bool:
-        """Status and outputs out of an answer, which is checked as if the FMU had written it. True if all went well.
+        """Read status and outputs from an untrusted answer. Returns True on success.
 
         Raises:
-            ChildLost: it is no answer to this question.
+            ChildLost: the answer is invalid.
         """
         kind = index % len(self._own)
         form = self._answers[kind]
@@ -170,7 +157,6 @@ class SandboxBank:
         return False
 
     def _lose(self, index: int, error: SkillframeError) -> None:
-        """End an instance's child and keep why."""
         child = self._children[index]
         if child is not None:
             child.kill()
@@ -178,7 +164,7 @@ class SandboxBank:
         self.active[index], self.status[index], self._problems[index] = 0, LOST, str(error)
 
     def refresh(self) -> bool:
-        """Outputs at the present inputs. No time passes."""
+        """See `Actuators.refresh`."""
         return self.step(self._time, 0.0)
 
     def _all(self, letter: bytes, what: str) -> None:
@@ -190,15 +176,15 @@ class SandboxBank:
                     self._lose(i, error)
 
     def save(self) -> None:
-        """Remember the state of every active instance."""
+        """See `Actuators.save`."""
         self._all(b"v", "saving its state")
 
     def restore(self) -> None:
-        """Return to the last `save`."""
+        """See `Actuators.restore`."""
         self._all(b"w", "restoring its state")
 
     def capabilities(self, index: int) -> Capabilities:
-        """What one instance can do, tried out in a child of its own."""
+        """Capabilities tested in a separate child."""
         kind = index % len(self._specs)
         if kind not in self._capabilities:
             spec, facts = self._kind(index)
@@ -206,11 +192,11 @@ class SandboxBank:
         return self._capabilities[kind]
 
     def problem(self, index: int) -> str:
-        """Why an instance failed, one sentence, or empty if it did not."""
+        """See `Actuators.problem`."""
         return self._problems.get(index, "")
 
     def close(self) -> None:
-        """End every child."""
+        """End all children."""
         left = [child for child in self._children if child is not None]
         for child in left:
             child.release()
@@ -220,7 +206,7 @@ class SandboxBank:
 
 
 def loading(facts: FmuFacts) -> dict[str, Any]:
-    """What a child is told to load an FMU. It reads no description itself."""
+    """Data with which a child loads an FMU without reading its description."""
     return {"facts": describe_here(facts), "path": str(facts.path)}
 
 
@@ -228,7 +214,7 @@ def probe_in_child(spec: ActuatorSpec, facts: FmuFacts, limits: SandboxLimits) -
     """`probe` in a child process.
 
     Raises:
-        ChildLost, InstanceFailed: the FMU does not survive it.
+        ChildLost, InstanceFailed: the FMU fails.
     """
     what = "its capabilities were tried out"
     child = Child(facts.path, spec.name or facts.name, limits)

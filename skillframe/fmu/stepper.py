@@ -1,7 +1,6 @@
-"""Two ways of stepping slots: one C call for all (stepper.c, built once), or cached ctypes calls without a compiler.
+"""Value references of a mapping, and steps by one C call (stepper.c) or, without a compiler, by ctypes calls.
 
-Both work on the same table of slots: function addresses, value references and pointers into the bank's arrays, all
-prepared once, because fmpy's list interface spends more time on packing lists than the FMU on the physics.
+Slots hold prepared addresses, because fmpy's lists would cost more time than the FMU.
 """
 
 from __future__ import annotations
@@ -15,9 +14,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.fmu.actuator import DISCARD, ENDED, NOT_FINITE
+from skillframe.errors import InputError
+from skillframe.fmu.actuator import DISCARD, ENDED, INPUTS, NOT_FINITE, OUTPUTS, ActuatorSpec
 from skillframe.fmu.bindings import Instance
 from skillframe.fmu.build import build_source
+from skillframe.fmu.facts import FLOATS, FmuFacts, FmuVariable, values_of
 
 Float = NDArray[np.float64]
 LARGEST = 64  # variables per slot, as in stepper.c
@@ -25,7 +26,7 @@ Step = Callable[[float, float], int]
 
 
 class Wiring(NamedTuple):
-    """Which of an instance's real variables meet which columns of `u` and `y`."""
+    """An instance's real variables and their columns in `u` and `y`."""
 
     instance: Instance
     in_refs: list[int]
@@ -35,7 +36,7 @@ class Wiring(NamedTuple):
 
 
 class Slot(ctypes.Structure):
-    """As in stepper.c."""
+    """Struct of stepper.c."""
 
     _fields_ = [
         *((name, ctypes.c_void_p) for name in (
@@ -46,32 +47,29 @@ class Slot(ctypes.Structure):
 
 @lru_cache(maxsize=1)
 def stepper_library() -> ctypes.CDLL | None:
-    """The built stepper, or None where there is no compiler."""
+    """Built stepper, or None."""
     path = build_source(Path(__file__).with_name("stepper.c"))
     return ctypes.CDLL(str(path)) if path else None
 
 
 class SlotTable:
-    """The slots of a bank and the arrays that they point into, kept alive together."""
+    """Slots of a bank, with the arrays they point into."""
 
     def __init__(self, wirings: Sequence[Wiring], u: Float, y: Float) -> None:
         self._keep: list[NDArray[np.generic]] = []
         self.wirings, self.u, self.y = wirings, u, y
         self.slots = (Slot * max(len(wirings), 1))()
         for slot, wiring, row_u, row_y in zip(self.slots, wirings, u, y, strict=False):
-            self._fill(slot, wiring, row_u, row_y)
-
-    def _fill(self, slot: Slot, wiring: Wiring, row_u: Float, row_y: Float) -> None:
-        instance = wiring.instance
-        slot.component, slot.version = instance.component, instance.version
-        slot.set = instance.address("fmi2SetReal", "fmi3SetFloat64")
-        slot.get = instance.address("fmi2GetReal", "fmi3GetFloat64")
-        slot.step = instance.address("fmi2DoStep", "fmi3DoStep")
-        slot.in_refs, slot.out_refs = (self._pin(refs, np.uint32) for refs in (wiring.in_refs, wiring.out_refs))
-        slot.in_columns = self._pin(wiring.in_columns, np.int64)
-        slot.out_columns = self._pin(wiring.out_columns, np.int64)
-        slot.u, slot.y = row_u.ctypes.data, row_y.ctypes.data
-        slot.n_in, slot.n_out = len(wiring.in_refs), len(wiring.out_refs)
+            instance = wiring.instance
+            slot.component, slot.version = instance.component, instance.version
+            slot.set = instance.address("fmi2SetReal", "fmi3SetFloat64")
+            slot.get = instance.address("fmi2GetReal", "fmi3GetFloat64")
+            slot.step = instance.address("fmi2DoStep", "fmi3DoStep")
+            slot.in_refs, slot.out_refs = (self._pin(refs, np.uint32) for refs in (wiring.in_refs, wiring.out_refs))
+            slot.in_columns = self._pin(wiring.in_columns, np.int64)
+            slot.out_columns = self._pin(wiring.out_columns, np.int64)
+            slot.u, slot.y = row_u.ctypes.data, row_y.ctypes.data
+            slot.n_in, slot.n_out = len(wiring.in_refs), len(wiring.out_refs)
 
     def _pin(self, numbers: list[int], dtype: type[np.generic]) -> int:
         array = np.array(numbers or [0], dtype=dtype)
@@ -79,12 +77,12 @@ class SlotTable:
         return int(array.ctypes.data)
 
     def statuses(self) -> list[int]:
-        """Status of every slot after the last call."""
+        """Status of every slot."""
         return [int(self.slots[i].status) for i in range(len(self.wirings))]
 
 
 def compiled_step(table: SlotTable, active: NDArray[np.uint8]) -> Step | None:
-    """A function (time, step) -> worst status that steps every slot in one call, or None without a compiler."""
+    """C function (time, step) -> worst status over all slots, or None."""
     library = stepper_library()
     if library is None:
         return None
@@ -95,7 +93,7 @@ def compiled_step(table: SlotTable, active: NDArray[np.uint8]) -> Step | None:
 
 
 def native_step(table: SlotTable) -> tuple[int, int, int] | None:
-    """Address of the slots, their number, and address of the C function that steps them. None without a compiler."""
+    """Address and number of the slots, and address of their C step function, or None."""
     library = stepper_library()
     if library is None:
         return None
@@ -104,7 +102,7 @@ def native_step(table: SlotTable) -> tuple[int, int, int] | None:
 
 
 def python_step(table: SlotTable, active: NDArray[np.uint8]) -> Step:
-    """The same by cached ctypes calls, one slot after the other."""
+    """`compiled_step` by cached ctypes calls."""
     now, length = ctypes.c_double(), ctypes.c_double()
     cells = [(i, _cell(table, i, now, length)) for i in range(len(table.wirings))]
     flags, slots = active.data, table.slots
@@ -125,7 +123,7 @@ def python_step(table: SlotTable, active: NDArray[np.uint8]) -> Step:
 
 
 def _cell(table: SlotTable, index: int, now: ctypes.c_double, length: ctypes.c_double) -> Callable[[bool], int]:
-    """One slot as a closure over ready ctypes objects, which cost half of what conversions of numbers do."""
+    """One slot as a closure over ctypes objects, which avoids conversions."""
     slot, wiring = table.slots[index], table.wirings[index]
     put, take, go = (ctypes.PYFUNCTYPE(ctypes.c_int)(address) for address in (slot.set, slot.get, slot.step))
     gather, values = _moved(table.u[index], wiring.in_columns)
@@ -162,8 +160,56 @@ _Move = tuple[Float, Float, NDArray[np.int64]] | None
 
 
 def _moved(row: Float, chosen: list[int]) -> tuple[_Move, Float]:
-    """(How to move numbers between a buffer and the row, the buffer): no move where the columns are adjacent."""
     if chosen and chosen == list(range(chosen[0], chosen[0] + len(chosen))):
         return None, row[chosen[0] : chosen[0] + len(chosen)]
     buffer = np.zeros(len(chosen))
     return (buffer, row, np.array(chosen, dtype=np.int64)), buffer
+
+
+def mapping(spec: ActuatorSpec, facts: FmuFacts) -> tuple[dict[str, FmuVariable], dict[str, FmuVariable]]:
+    """Mapped inputs and outputs of an FMU.
+
+    Raises:
+        UnknownName: a mapped name that the FMU lacks.
+        InputError: no input, no force, a variable that is no real scalar, or a parameter of the wrong type.
+    """
+    chosen_in = spec.inputs or {n: n for n in INPUTS if n in facts.names("input")}
+    chosen_out = spec.outputs or {n: n for n in OUTPUTS if n in facts.names("output")}
+    inputs = {ours: _scalar(facts, theirs, "input") for ours, theirs in chosen_in.items()}
+    outputs = {ours: _scalar(facts, theirs, "output") for ours, theirs in chosen_out.items()}
+    where = f"{spec.name or facts.name} ({facts.path.name})"
+    if not inputs:
+        known = ", ".join(facts.names("input")) or "none"
+        raise InputError(where, f"no input is mapped (it has: {known})", 'add inputs = { command = "..." }')
+    if "force" not in outputs:
+        known = ", ".join(facts.names("output")) or "none"
+        raise InputError(where, f"no output is mapped to force (it has: {known})", 'add outputs = { force = "..." }')
+    for name in spec.parameters:
+        values_of(facts.variable(name, "parameter"), spec.parameters[name], where)
+    return inputs, outputs
+
+
+def _scalar(facts: FmuFacts, name: str, causality: str) -> FmuVariable:
+    variable = facts.variable(name, causality)
+    if variable.type not in FLOATS or variable.size != 1:
+        what = f"an array of {variable.size}" if variable.size != 1 else f"of type {variable.type}"
+        raise InputError(
+            f"{facts.path.name}: {name}", f"is {what}; a mapped variable is one real number", "map another"
+        )
+    return variable
+
+
+def wire(instance: Instance, spec: ActuatorSpec, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> Wiring:
+    """Wiring of one instance.
+
+    Raises:
+        UnknownName, InputError: as `mapping`; more than 64 variables.
+    """
+    ins, outs = mapping(spec, instance.facts)
+    if max(len(ins), len(outs)) > LARGEST:
+        raise InputError(instance.name, f"more than {LARGEST} variables are mapped", "map fewer")
+    return Wiring(
+        instance,
+        [v.reference for v in ins.values()], [inputs.index(name) for name in ins],
+        [v.reference for v in outs.values()], [outputs.index(name) for name in outs],
+    )  # fmt: skip

@@ -1,14 +1,16 @@
-"""The worker of `keeper`: one FMU under limits, answering over a channel.
+"""Worker process of `keeper`: one FMU under limits, which answers over a channel.
 
-Letters: l load, s start, t step, v save, w restore, p probe, k check, m simulate, i inspect, j judge the description,
-h how confined, q leave. An answer begins with "." or, for a problem in words, with "!" or "?" (an input's).
+Letters: l load, s start, t step, v save, w restore, p probe, k check, m simulate, i inspect, j judge the description, h
+confinement, q leave. An answer begins with ".", "!" for a problem, or "?" for an input's.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import os
 import struct
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,22 +21,14 @@ import numpy as np
 
 from skillframe.errors import InputError, SkillframeError
 from skillframe.fmu.actuator import DISCARD, ActuatorSpec
-from skillframe.fmu.channel import Channel
-from skillframe.fmu.driver import FmuBank
-from skillframe.fmu.inspection import FmuFacts, describe_here, facts_from, inspect_here, judge_here
-from skillframe.fmu.probe import probe, try_out
-
-OUT_OF_MEMORY = 12
-LARGEST_REQUEST = 1 << 30
+from skillframe.fmu.child import Channel
+from skillframe.fmu.driver import FmuBank, probe, try_out
+from skillframe.fmu.facts import FmuFacts
+from skillframe.fmu.inspection import describe_here, facts_from, inspect_here, judge_here
 
 
 class Worker:
-    """State of the child: a bank of one.
-
-    Args:
-        channel: to skillframe.
-        confined: what of the system's confinement holds.
-    """
+    """A bank of one instance, on a channel and under the `confined` measures."""
 
     def __init__(self, channel: Channel, confined: dict[str, Any]) -> None:
         self.channel, self.confined = channel, confined
@@ -46,10 +40,10 @@ class Worker:
         }  # fmt: skip
 
     def serve(self) -> None:
-        """Answer until told to leave or the parent is gone."""
+        """Answer requests until "q" or a lost parent."""
         while True:
             try:
-                request = self.channel.receive(LARGEST_REQUEST)
+                request = self.channel.receive(1 << 30)
             except (EOFError, OSError):
                 return
             if request[:1] == b"q":
@@ -60,7 +54,7 @@ class Worker:
         try:
             return b"." + self.calls[request[:1]](request[1:])
         except MemoryError:
-            os._exit(OUT_OF_MEMORY)
+            os._exit(12)  # out of memory
         except InputError as error:
             return b"?" + json.dumps([error.where, error.problem, error.fix]).encode()
         except SkillframeError as error:
@@ -69,7 +63,7 @@ class Worker:
             return b"!" + f"{type(error).__name__}: {error}".encode()
 
     def load(self, payload: bytes) -> bytes:
-        """Load the FMU. Columns of the parent's arrays may be more than ours."""
+        """Load the FMU and match the parent's columns."""
         given = json.loads(payload)
         spec = ActuatorSpec(**{**given["spec"], "name": given["name"]})
         self.bank = FmuBank([spec], [_facts(given)], compiled=False)
@@ -79,7 +73,7 @@ class Worker:
 
     @property
     def one(self) -> FmuBank:
-        """The bank.
+        """The loaded bank.
 
         Raises:
             SkillframeError: nothing is loaded.
@@ -93,14 +87,13 @@ class Worker:
             self.one.u[0, own] = values[given]
 
     def _told(self) -> bytes:
-        """Status, the outputs that were asked for, and a problem in words."""
         bank = self.one
         status = int(bank.status[0])
         text = bank.problem(0) if status >= DISCARD else ""
         return struct.pack("q", status) + bank.y[0, self.out_of].tobytes() + text.encode()
 
     def start(self, payload: bytes) -> bytes:
-        """Reset and initialise. Returns the memory held, then the same as a step."""
+        """Reset and initialise. Returns the memory in use, then the answer of a step."""
         given = json.loads(payload)
         self._take(given["u"])
         self.one.status[:] = 0
@@ -108,7 +101,7 @@ class Worker:
         return struct.pack("q", _resident()) + self._told()
 
     def step(self, payload: bytes) -> bytes:
-        """Step, or refresh for a step of zero."""
+        """Step, or refresh for a zero step."""
         time, step = struct.unpack_from("dd", payload)
         self._take(np.frombuffer(payload[16:]))
         bank = self.one
@@ -118,26 +111,26 @@ class Worker:
         return self._told()
 
     def save(self, payload: bytes) -> bytes:
-        """Remember the state."""
+        """Save the state."""
         self.one.save()
         return b""
 
     def restore(self, payload: bytes) -> bytes:
-        """Return to it."""
+        """Restore the state."""
         self.one.restore()
         return b""
 
     def probe(self, payload: bytes) -> bytes:
-        """Try out capabilities."""
+        """Test the capabilities."""
         given = json.loads(payload)
         return json.dumps(list(probe(_facts(given), ActuatorSpec(**given["spec"])))).encode()
 
     def check(self, payload: bytes) -> bytes:
-        """A short trial with inputs at their start values. Returns whether its state repeats."""
+        """Do a short run. Returns whether its state repeats."""
         return json.dumps(try_out(_facts(json.loads(payload)))).encode()
 
     def simulate(self, payload: bytes) -> bytes:
-        """Simulate on its own, sending rows as they come. The last answer is empty."""
+        """Simulate, sending rows and then an empty answer."""
         from skillframe.fmu.simulate import Request, run
 
         given = json.loads(payload)
@@ -147,12 +140,21 @@ class Worker:
         return b"[]"
 
     def inspect(self, payload: bytes) -> bytes:
-        """What the file says."""
-        return json.dumps(describe_here(inspect_here(Path(json.loads(payload)["path"])))).encode()
+        """Facts of the file."""
+        return json.dumps(describe_here(inspect_here(_at(payload)))).encode()
 
     def judge(self, payload: bytes) -> bytes:
-        """What is wrong with its description."""
-        return json.dumps(judge_here(Path(json.loads(payload)["path"]))).encode()
+        """Problems of its description."""
+        return json.dumps(judge_here(_at(payload))).encode()
+
+
+def _at(payload: bytes) -> Path:
+    given = json.loads(payload)
+    import resource
+
+    _, most = resource.getrlimit(resource.RLIMIT_CPU)
+    resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(time.process_time()) + int(given["processor_s"]), most))
+    return Path(given["path"])
 
 
 def _facts(given: dict[str, Any]) -> FmuFacts:
@@ -160,7 +162,6 @@ def _facts(given: dict[str, Any]) -> FmuFacts:
 
 
 def _resident() -> int:
-    """Memory held now [bytes], 0 where the system does not tell."""
     try:
         return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE")
     except (OSError, ValueError, IndexError):

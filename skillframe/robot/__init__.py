@@ -1,9 +1,10 @@
-"""Robots by URDF: robot.toml (`spec`), loading (`model`), mass audit (`audit`), kinematics and dynamics (`kinematics`).
+"""Robots described by a URDF and robot.toml.
 
-Reading a robot.toml needs no Pinocchio; import the other modules by name where they are used.
+Only `spec` is imported here, so that reading robot.toml needs no Pinocchio.
 """
 
 from skillframe.robot.interface import Control
-from skillframe.robot.spec import Arm, Limits, RobotSpec, Workspace, load_robot, robot_names
+from skillframe.robot.spec import Limits, RobotSpec, Workspace, load_robot, robot_names
+from skillframe.robot.tables import Arm
 
 __all__ = ["Arm", "Control", "Limits", "RobotSpec", "Workspace", "load_robot", "robot_names"]

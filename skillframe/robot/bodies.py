@@ -1,12 +1,11 @@
-r"""Rigid bodies of a URDF: links that fixed joints make one, and their size.
+r"""Rigid bodies of a URDF, links joined by fixed joints, and their sizes.
 
-A body's size is its reach from the origin of the joint that moves it, to its child joints and to its geometry
-(contract: `robots check`). Where nothing tells (no child joint at a distance, no geometry), it is unknown; where a mesh
-cannot be measured, the reach is only a lower bound.
+A body's size is the distance from its joint to child joints and geometry.
 """
 
 from __future__ import annotations
 
+import copy
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,8 +14,7 @@ import numpy as np
 
 from skillframe.frames import Float, Pose, rotation_matrix
 from skillframe.robot.meshes import mesh_vertices, resolve_mesh
-from skillframe.robot.numbers import numbers
-from skillframe.robot.urdf import Joint, Urdf
+from skillframe.robot.urdf import Joint, Urdf, numbers
 
 _ZERO3 = (0.0, 0.0, 0.0)
 
@@ -26,11 +24,12 @@ class Body:
     """A rigid body.
 
     Attributes:
-        joint: that moves it, None for the root body; parent: index of the body that carries it, -1 for the root.
-        links: names of its links, the first one carries the joint.
-        reach: to child joints and geometry [m], 0 where unknown; bound: the reach is only a lower bound.
-        far: (3,) the child joint farthest away, in body axes [m].
-        guess: mass that it is guessed to have [kg], 0 before anybody guesses.
+        joint: that moves it, None for the root; parent: index, or -1.
+        links: names, the one at the joint first.
+        reach: to child joints and geometry [m], or 0; bound: a lower bound only.
+        meshes: longest edge of each bounding box [m], by file name.
+        far: (3,) farthest child joint, in body axes [m].
+        guess: guessed mass [kg] or 0; doubted: its own mass is a placeholder.
     """
 
     joint: str | None
@@ -38,16 +37,18 @@ class Body:
     links: list[str] = field(default_factory=list)
     reach: float = 0.0
     bound: bool = False
+    meshes: dict[str, float] = field(default_factory=dict)
     far: Float = field(default_factory=lambda: np.zeros(3))
     guess: float = 0.0
+    doubted: bool = False
 
 
 def rigid_bodies(urdf: Urdf) -> list[Body]:
-    """Bodies of a tree, root first."""
+    """Return the bodies of a tree, root first."""
     children = urdf.children()
     bodies: list[Body] = []
     heads: list[tuple[str | None, str, int]] = [(None, urdf.root, -1)]
-    for index, (joint, head, parent) in enumerate(heads):  # grows while it is walked
+    for index, (joint, head, parent) in enumerate(heads):
         body = Body(joint=joint, parent=parent)
         heads += [(*leaving, index) for leaving in _gather(body, urdf, children, head)]
         bodies.append(body)
@@ -55,25 +56,34 @@ def rigid_bodies(urdf: Urdf) -> list[Body]:
 
 
 def size_of(body: Body, bodies: list[Body]) -> float:
-    """A body's size [m]: its reach, or, where that is unknown, that of the robot's largest link. 0 if none is known."""
+    """Size of a body [m], else the largest of the robot, else 0."""
     if body.reach > 0.0 and not body.bound:
         return body.reach
     return max(b.reach for b in [body, *bodies])
 
 
 def missing_meshes(urdf: Urdf) -> dict[str, str]:
-    """File names of meshes that are not found, each with the first link that uses it."""
+    """File names of missing meshes, each with the first link that uses it."""
     missing: dict[str, str] = {}
     for name, link in urdf.links.items():
         for mesh in link.findall("*/geometry/mesh"):
             uri = mesh.get("filename", "")
-            if uri not in missing and resolve_mesh(uri, urdf.path) is None:
+            if uri and uri not in missing and resolve_mesh(uri, urdf.path) is None:
                 missing[uri] = name
     return missing
 
 
+def without_meshes(urdf: Urdf) -> Urdf:
+    """Tree with empty mesh file names."""
+    links = {name: copy.deepcopy(link) for name, link in urdf.links.items()}
+    for link in links.values():
+        for mesh in link.findall("*/geometry/mesh"):
+            mesh.set("filename", "")
+    return urdf._replace(links=links)
+
+
 def placement(element: ET.Element | None) -> Pose:
-    """Pose that an <origin> inside an element states, in fixed-axis roll, pitch, yaw."""
+    """Pose given by the <origin> of an element, in fixed-axis roll, pitch, yaw."""
     origin = element.find("origin") if element is not None else None
     roll, pitch, yaw = np.diag(numbers(origin, "rpy", 3, _ZERO3))
     rotation = rotation_matrix(yaw) @ rotation_matrix(pitch) @ rotation_matrix(roll)
@@ -81,12 +91,23 @@ def placement(element: ET.Element | None) -> Pose:
 
 
 def _gather(body: Body, urdf: Urdf, children: dict[str, list[Joint]], head: str) -> list[tuple[str, str]]:
-    """Fill a body with the links that are fixed to its head. Returns the joints that leave it."""
+    """Add the links fixed to `head`, and return the joints that leave the body."""
     leaving: list[tuple[str, str]] = []
     links = [(head, Pose(np.zeros(3), np.eye(3)))]
-    for name, pose in links:  # grows while it is walked
+    for name, pose in links:
         body.links.append(name)
-        _measure(body, urdf.links[name], pose, urdf.path)
+        link = urdf.links[name]
+        for drawn in [*link.findall("visual"), *link.findall("collision")]:
+            for shape in drawn.findall("geometry/*"):
+                points = _points(shape, urdf.path)
+                if points is None:
+                    body.bound = True
+                    continue
+                if shape.tag == "mesh":
+                    body.meshes[shape.get("filename", "")] = float(np.ptp(points, axis=0).max())
+                placed = pose.compose(placement(drawn))
+                world = points @ placed.rotation.T + placed.position
+                body.reach = max(body.reach, float(np.linalg.norm(world, axis=1).max()))
         for joint in children[name]:
             inside = pose.compose(placement(joint.element))
             distance = float(np.linalg.norm(inside.position))
@@ -100,20 +121,8 @@ def _gather(body: Body, urdf: Urdf, children: dict[str, list[Joint]], head: str)
     return leaving
 
 
-def _measure(body: Body, link: ET.Element, pose: Pose, path: Path) -> None:
-    for drawn in [*link.findall("visual"), *link.findall("collision")]:
-        for shape in drawn.findall("geometry/*"):
-            points = _points(shape, path)
-            if points is None:
-                body.bound = True
-                continue
-            placed = pose.compose(placement(drawn))
-            world = points @ placed.rotation.T + placed.position
-            body.reach = max(body.reach, float(np.linalg.norm(world, axis=1).max()))
-
-
 def _points(shape: ET.Element, path: Path) -> Float | None:
-    """Points that span a shape, in its own axes, or None where it cannot be measured."""
+    """Points that span a shape, in its own axes, or None."""
     corners = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
     if shape.tag == "box":
         extent: Float = 0.5 * np.array(numbers(shape, "size", 3, _ZERO3))
@@ -134,7 +143,7 @@ def _points(shape: ET.Element, path: Path) -> Float | None:
 
 
 def mesh_scale(mesh: ET.Element) -> Float:
-    """(3,) scale of a <mesh>, 1 where it says none or none that can be read."""
+    """(3,) scale of a <mesh>, 1 where none can be read."""
     try:
         return np.array(numbers(mesh, "scale", 3, (1.0, 1.0, 1.0)))
     except ValueError:

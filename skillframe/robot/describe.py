@@ -1,7 +1,8 @@
-"""A robot in words and figures a person can read, degrees only there and with their unit, and the same as JSON."""
+"""Description of a robot as text, with degrees where marked, and as JSON."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -12,16 +13,15 @@ from skillframe.errors import SkillframeError
 from skillframe.frames import quaternion_from_matrix, rotation_vector
 from skillframe.robot.bodies import rigid_bodies
 from skillframe.robot.chain import ClosedChain
-from skillframe.robot.driven import Actuation
-from skillframe.robot.guesses import guess_note
 from skillframe.robot.kinematics import tool_pose
-from skillframe.robot.link_checks import given_inertias
+from skillframe.robot.link_checks import given_inertias, guess_note
 from skillframe.robot.model import RobotModel
 from skillframe.robot.spec import RobotSpec
+from skillframe.robot.tables import Actuation, Arm
 
 
-def describe(robot: RobotModel) -> str:
-    """Joints with limits and home, mass, arms with the tool's pose at home, what drives and loads a machine."""
+def describe(robot: RobotModel, of_drive: Sequence[str] = ()) -> str:
+    """Text with joints, limits, mass, arms, actuators and payload."""
     robot = _closed(robot)
     spec, model = robot.spec, robot.model
     mass, moving = _mass(robot), _moving(robot)
@@ -40,34 +40,32 @@ def describe(robot: RobotModel) -> str:
     for arm, frame in zip(spec.arm, robot.tool_frames, strict=True):
         pose = tool_pose(model, robot.home, frame)
         turn = np.degrees(rotation_vector(pose.rotation))
-        lines += ["", f"  arm {arm.name!r}: tool frame {arm.tool_frame!r}"]
+        lines += ["", f"  arm {arm.name!r}: tool frame {arm.tool_frame!r}{_axis(arm)}"]
         lines += [f"    at home {_triple(pose.position)} m, turned by the rotation vector {_triple(turn, 1)} degrees"]
         lines += [f"    z axis (out along the tool) {_triple(pose.rotation[:, 2])}"]
-    return "\n".join([*lines, *_machine(robot)])
+    return "\n".join([*lines, *_machine(robot, of_drive)])
+
+
+def _axis(arm: Arm) -> str:
+    return "" if arm.tool_axis == "z" else f", its {arm.tool_axis} axis out along the tool"
 
 
 def _closed(robot: RobotModel) -> RobotModel:
-    """The robot with the joints of its loops where they stand at home, or as it is where the loops do not close."""
-    if not robot.spec.loop:
+    if not robot.spec.machine:
         return robot
     try:
         chain = ClosedChain(robot)
-        return replace(robot, home=chain.configuration(chain.minimal(robot.home)))
+        return replace(robot, home=chain.home)
     except SkillframeError:
         return robot
 
 
-def _machine(robot: RobotModel) -> list[str]:
-    """Lines on loops, actuators, what it measures with, and payload, or none for a robot without them."""
+def _machine(robot: RobotModel, of_drive: Sequence[str]) -> list[str]:
     spec = robot.spec
     lines = [f"  loop: {loop.frame_a} meets {loop.frame_b}" for loop in spec.loop]
     lines += [f"  {a.joint} is driven by {a.fmu}{_how(a, spec)}" for a in spec.actuation]
-    if spec.hydraulic:
-        seen, gains = spec.sensors, spec.gains
-        noise = f"encoders {seen.encoder:g} rad (m), pressures {seen.pressure:g} Pa"
-        lines.append(f"  sensors: noise of {noise}, behind filters of {seen.corner_hz:g} Hz")
-        body = "derived in a run" if gains.body is None else f"{gains.body:.4g} N s/m (N m s/rad)"
-        lines.append(f"  gains: bodies {body}, rate of the required force {gains.force_corner_hz:g} Hz")
+    lines += [f"  {name} is drawn backwards in the URDF: here it grows as the rod slides out" for name in robot.turned]
+    lines += of_drive
     if spec.payload is not None:
         load = spec.payload
         lines.append(f"  payload {load.mass:g} kg in {load.link!r}, rated for {load.rating:g} kg")
@@ -75,8 +73,7 @@ def _machine(robot: RobotModel) -> list[str]:
 
 
 def _measured(spec: RobotSpec) -> list[str]:
-    """What the controller of an arm knows of its joints, and how late its torques are. None for machines."""
-    if spec.hydraulic or spec.other_drive:
+    if spec.own_law:
         return []
     known = "exact positions and velocities" if spec.encoders is None else str(spec.encoders)
     ms = 1e3 * spec.control.late_s
@@ -97,8 +94,8 @@ def _how(actuation: Actuation, spec: RobotSpec) -> str:
     return f", with gains of {text}"
 
 
-def as_json(robot: RobotModel) -> dict[str, Any]:
-    """The same for scripts, in SI units and radians. Null where there is no limit, or no home of its own."""
+def as_json(robot: RobotModel, of_drive: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """The description in SI units and radians. Missing limits and homes are null."""
     robot = _closed(robot)
     spec, model = robot.spec, robot.model
     return {
@@ -110,7 +107,7 @@ def as_json(robot: RobotModel) -> dict[str, Any]:
         "delay_s": spec.control.late_s,
         "joints": [_joint_values(robot, index) for index in range(1, model.njoints)],
         "arms": [_arm_values(robot, i) for i in range(len(spec.arm))],
-        **(_machine_values(spec) if spec.loop or spec.actuation or spec.payload else {}),
+        **({**_machine_values(spec), **(of_drive or {})} if spec.loop or spec.actuation or spec.payload else {}),
     }  # fmt: skip
 
 
@@ -122,7 +119,7 @@ def _machine_values(spec: RobotSpec) -> dict[str, Any]:
     elif spec.actuation:
         kept = ("joint", "fmu", "velocity_gain", "force_gain")
         drives = [{name: getattr(drive, name) for name in kept} for drive in spec.actuation]
-        values |= {"actuation": drives, "sensors": asdict(spec.sensors), "gains": asdict(spec.gains)}
+        values |= {"actuation": drives}
     return values
 
 
@@ -140,7 +137,8 @@ def _joint_values(robot: RobotModel, index: int) -> dict[str, Any]:
 def _arm_values(robot: RobotModel, index: int) -> dict[str, Any]:
     arm, pose = robot.spec.arm[index], tool_pose(robot.model, robot.home, robot.tool_frames[index])
     return {
-        "name": arm.name, "tool_frame": arm.tool_frame, "home_position_m": pose.position.tolist(),
+        "name": arm.name, "tool_frame": arm.tool_frame, "tool_axis": arm.tool_axis,
+        "home_position_m": pose.position.tolist(),
         "home_quaternion_xyzw": quaternion_from_matrix(pose.rotation).tolist(),
     }  # fmt: skip
 
@@ -158,14 +156,12 @@ def _moving(robot: RobotModel) -> int:
 
 
 def _home(robot: RobotModel, joint: pin.JointModel) -> float:
-    """Value of a joint of one freedom at home [rad or m]. A continuous one holds cosine and sine."""
     if joint.nq == 2:
         return float(np.arctan2(robot.home[joint.idx_q + 1], robot.home[joint.idx_q]))
     return float(robot.home[joint.idx_q])
 
 
 def _bounds(robot: RobotModel, joint: pin.JointModel) -> tuple[float, float] | None:
-    """Its range, or None where it turns or slides freely."""
     low, high = (limit[joint.idx_q] for limit in (robot.model.lowerPositionLimit, robot.model.upperPositionLimit))
     return (float(low), float(high)) if joint.nq == 1 and low < high else None
 

@@ -1,31 +1,26 @@
-r"""Kinematics and dynamics of a robot at a state, and inverse kinematics.
+r"""Kinematics, dynamics and inverse kinematics of a robot, in base axes at a point.
 
-Everything is in base axes at a point of interest (Pinocchio's LOCAL_WORLD_ALIGNED): for a point fixed in frame f at an
-offset r, \(J_r = [J_v - [R r]_\times J_\omega;\; J_\omega]\).
-
-Inverse kinematics minimises the error \(e = [p_d - p;\ \log(R_d R^T)]\) by the Levenberg-Marquardt step
-\(\Delta = J^T (J J^T + \lambda I)^{-1} e\) with \(\lambda = e^T e / 2 + 10^{-10}\): damping that vanishes with the
-error (Sugihara, "Solvability-Unconcerned Inverse Kinematics by the Levenberg-Marquardt Method", IEEE T-RO 27(5), 2011).
-Joint limits by clipping each step and leaving clipped joints out of the next, and seeded restarts are our choice.
+For offset r in frame f, \(J_r = [J_v - [R r]_\times J_\omega;\; J_\omega]\). Inverse kinematics minimises \(e = [p_d -
+p;\ \log(R_d R^T)]\) with Levenberg-Marquardt steps \(\Delta = J^T (J J^T + \lambda I)^{-1} e\), \(\lambda = e^T e / 2 +
+10^{-10}\) (Sugihara, IEEE T-RO 27(5), 2011), clipped at joint limits, and random restarts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from skillframe.errors import SkillframeError
+from skillframe.errors import InputError, SkillframeError
 from skillframe.frames import Float, Pose, rotation_vector, skew
-from skillframe.robot.model import RobotModel
+from skillframe.robot.model import ROOT_JOINT, RobotModel, load_model
+from skillframe.robot.spec import load_robot
 
 Flags = NDArray[np.bool_]
 
-_TOLERANCE = 1e-9  # m and rad: far below any clearance, far above rounding
-_STEPS = 60
-_RESTARTS = 30
+_TOLERANCE = 1e-9  # m and rad
 _LWA = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
 
 
@@ -33,8 +28,8 @@ class UnreachablePose(SkillframeError):
     """No configuration within the joint limits was found for a pose.
 
     Attributes:
-        arm: name of the arm; residual_m, residual_rad: what the nearest configuration found still misses.
-        limits: the limit [rad or m], by name, of every joint that stands there and would have to go on.
+        arm: its name; residual_m, residual_rad: remaining error.
+        limits: limits [rad or m] by joint name that hinder.
     """
 
     def __init__(
@@ -55,7 +50,7 @@ class RobotState:
     """Mass matrix, bias forces, poses and Jacobians at one state (q, v).
 
     Attributes:
-        mass: (nv, nv) joint-space mass matrix; bias: (nv,) Coriolis, centrifugal and gravity forces [N m or N].
+        mass: (nv, nv) mass matrix; bias: (nv,) Coriolis, centrifugal and gravity forces [N m or N].
     """
 
     __slots__ = ("_data", "_model", "_v", "bias", "mass")
@@ -73,7 +68,7 @@ class RobotState:
         return _pose(self._data.oMf[frame])
 
     def jacobian(self, frame: int, offset: Float | None = None) -> Float:
-        """(6, nv) Jacobian, linear part first, base axes, at a point `offset` (3,) in frame axes [m]."""
+        """(6, nv) Jacobian in base axes, linear part first, at a point `offset` (3,) in frame axes [m]."""
         jacobian: Float = np.array(pin.getFrameJacobian(self._model, self._data, frame, _LWA))
         if offset is not None:
             jacobian[:3] -= skew(self._data.oMf[frame].rotation @ offset) @ jacobian[3:]
@@ -86,7 +81,7 @@ class RobotState:
 
 
 def at(robot: RobotModel | pin.Model, q: Float, v: Float) -> RobotState:
-    """The robot's state at a configuration (nq,) and velocity (nv,)."""
+    """Return the state at a configuration (nq,) and velocity (nv,)."""
     return RobotState(robot.model if isinstance(robot, RobotModel) else robot, q, v)
 
 
@@ -98,16 +93,9 @@ def tool_pose(model: pin.Model, q: Float, frame: int) -> Pose:
 
 
 def inverse_kinematics(robot: RobotModel, arm: str | int, pose: Pose, q0: Float) -> Float:
-    """A configuration that puts an arm's tool frame at a pose, near `q0` where there is one near.
+    """Configuration (nq,) that puts an arm's tool frame at a pose in base, starting from `q0`.
 
-    Args:
-        robot: the nominal model; on a free base the joints stay as they are and the base is solved in closed form.
-        arm: name or index.
-        pose: of the tool frame in base.
-        q0: (nq,) where to start; decides which of several solutions is found.
-
-    Returns:
-        (nq,) configuration within the joint limits; the same for the same arguments.
+    It is within the joint limits and deterministic. A free base is placed in closed form.
 
     Raises:
         UnreachablePose: none was found.
@@ -115,7 +103,12 @@ def inverse_kinematics(robot: RobotModel, arm: str | int, pose: Pose, q0: Float)
     index = robot.arm_index(arm) if isinstance(arm, str) else arm
     frame = robot.tool_frames[index]
     if robot.spec.base == "free":
-        return _place_base(robot.model, frame, pose, q0)
+        q = np.array(q0)
+        base = pin.XYZQUATToSE3(q[:7])
+        now = tool_pose(robot.model, q, frame)
+        inside = base.inverse() * pin.SE3(now.rotation, now.position)
+        q[:7] = pin.SE3ToXYZQUAT(pin.SE3(pose.rotation, pose.position) * inside.inverse())
+        return q
     best, error = q0, np.full(6, np.inf)
     for start in _starts(robot.model, frame, q0):
         q, left = _descend(robot.model, frame, pose, start)
@@ -125,12 +118,20 @@ def inverse_kinematics(robot: RobotModel, arm: str | int, pose: Pose, q0: Float)
             best, error = q, left
     residual = _error(pose, tool_pose(robot.model, best, frame))
     missed, turned = float(np.linalg.norm(residual[:3])), float(np.linalg.norm(residual[3:]))
-    held = _holding_limits(robot.model, frame, best, residual)
+    model = robot.model
+    low, high, bounded = _bounds(model)
+    drive = pin.computeFrameJacobian(model, model.createData(), best, frame, _LWA).T @ residual
+    held = {}
+    for name, joint in zip(list(model.names)[1:], list(model.joints)[1:], strict=True):
+        if joint.nq == 1 and bounded[i := joint.idx_q]:
+            limit = high[i] if drive[joint.idx_v] > 0.0 else low[i]
+            if abs(best[i] - limit) < _TOLERANCE and abs(drive[joint.idx_v]) > _TOLERANCE:
+                held[name] = float(limit)
     raise UnreachablePose(robot.spec.arm[index].name, pose, missed, turned, held)
 
 
 def random_configuration(model: pin.Model, rng: np.random.Generator) -> Float:
-    """(nq,) configuration uniform within the limits. Where there are none, within +-pi rad or m of neutral."""
+    """(nq,) configuration uniform within the limits, or +-pi rad or m of neutral."""
     q: Float = pin.integrate(model, pin.neutral(model), rng.uniform(-np.pi, np.pi, model.nv))
     low, high, bounded = _bounds(model)
     span = np.minimum(high, 1e6) - np.maximum(low, -1e6)
@@ -146,84 +147,91 @@ def _error(wanted: Pose, now: Pose) -> Float:
     return np.concatenate([wanted.position - now.position, rotation_vector(wanted.rotation @ now.rotation.T)])
 
 
-def _place_base(model: pin.Model, frame: int, pose: Pose, q0: Float) -> Float:
-    """Q with the free-flying base placed so that the frame is at the pose: base = pose (base^-1 frame)^-1."""
-    q = np.array(q0)
-    base = pin.XYZQUATToSE3(q[:7])
-    now = tool_pose(model, q, frame)
-    inside = base.inverse() * pin.SE3(now.rotation, now.position)
-    q[:7] = pin.SE3ToXYZQUAT(pin.SE3(pose.rotation, pose.position) * inside.inverse())
-    return q
-
-
 def _bounds(model: pin.Model) -> tuple[Float, Float, Flags]:
-    """Limits (nq,) and which coordinates they bound: those of joints with one coordinate and a range."""
     low, high = np.array(model.lowerPositionLimit), np.array(model.upperPositionLimit)
     single = np.zeros(model.nq, dtype=bool)
     for joint in list(model.joints)[1:]:
-        if joint.nq == 1:  # a joint that follows another has none, and another's index
+        if joint.nq == 1:
             single[joint.idx_q] = True
     return low, high, single & (low < high)
 
 
 def _starts(model: pin.Model, frame: int, q0: Float) -> Iterator[Float]:
-    """First q0, then random configurations of the joints that move the frame. Every other joint stays."""
     yield q0
     moves = np.zeros(model.nq, dtype=bool)
     for index in list(model.supports[model.frames[frame].parentJoint])[1:]:
         joint = model.joints[index]
         moves[joint.idx_q : joint.idx_q + joint.nq] = True
-    rng = np.random.default_rng(0)  # fixed: the same question has the same answer
-    for _ in range(_RESTARTS):
+    rng = np.random.default_rng(0)
+    for _ in range(30):
         yield np.where(moves, random_configuration(model, rng), q0)
 
 
 def _descend(model: pin.Model, frame: int, pose: Pose, q0: Float) -> tuple[Float, Float]:
-    """Damped least squares from one start: configuration and the error (6,) left."""
     data, (low, high, bounded) = model.createData(), _bounds(model)
     q, held = np.array(q0), np.zeros(model.nv, dtype=bool)
-    columns = _columns(model, bounded)
-    for _ in range(_STEPS):
+    pairs = [(j.idx_q, j.idx_v) for j in list(model.joints)[1:] if j.nq == 1 and bounded[j.idx_q]]
+    places, speeds = [p[0] for p in pairs], [p[1] for p in pairs]
+    for _ in range(60):
         jacobian = pin.computeFrameJacobian(model, data, q, frame, _LWA)
         pin.updateFramePlacement(model, data, frame)
         error = _error(pose, _pose(data.oMf[frame]))
         if np.abs(error).max() < _TOLERANCE:
             break
-        step = _step(jacobian, error, held)
+        jacobian = np.where(held, 0.0, jacobian)
+        damping = 0.5 * float(error @ error) + 1e-10
+        gain = jacobian @ jacobian.T
+        gain.flat[::7] += damping
+        step = jacobian.T @ np.linalg.solve(gain, error)
         q_new = pin.integrate(model, q, step)
         clipped = np.where(bounded, np.clip(q_new, low, high), q_new)
         held = np.zeros(model.nv, dtype=bool)
-        held[columns[1]] = (clipped != q_new)[columns[0]]
+        held[speeds] = (clipped != q_new)[places]
         if np.abs(clipped - q).max() < 1e-13:
             break
         q = clipped
     return q, error
 
 
-def _holding_limits(model: pin.Model, frame: int, q: Float, error: Float) -> dict[str, float]:
-    """Limits that joints stand at by name, of those that the error (6,) would drive on: J^T e points out of them."""
-    low, high, bounded = _bounds(model)
-    drive = pin.computeFrameJacobian(model, model.createData(), q, frame, _LWA).T @ error
-    found = {}
-    for name, joint in zip(list(model.names)[1:], list(model.joints)[1:], strict=True):
-        if joint.nq == 1 and bounded[i := joint.idx_q]:
-            limit = high[i] if drive[joint.idx_v] > 0.0 else low[i]
-            if abs(q[i] - limit) < _TOLERANCE and abs(drive[joint.idx_v]) > _TOLERANCE:
-                found[name] = float(limit)
+def tool_poses(robot: str, arm: str | None, names: Sequence[str], positions: Float) -> Pose:
+    """Poses of a robot's tool frame in base, position (T, 3) and rotation (T, 3, 3).
+
+    Args:
+        robot: name or path.
+        arm: name, or None for the only one.
+        names: recorded joints.
+        positions: (T, len(names)) [rad, m].
+
+    Raises:
+        InputError, UnknownName: a wrong robot or arm, a free base, or a missing joint.
+    """
+    model = load_model(load_robot(robot))
+    if arm is None and len(model.spec.arm) != 1:
+        arms = ", ".join(a.name for a in model.spec.arm) or "none"
+        raise InputError(f"robot {robot}", f"has the arms {arms}", "choose one with --set arm")
+    frame = model.tool_frames[0 if arm is None else model.arm_index(arm)]
+    columns = [(model.model.joints[i], names.index(name)) for i, name in _joints(model, robot, frame, names)]
+    configuration, data = model.home.copy(), model.model.createData()
+    position, rotation = np.empty((len(positions), 3)), np.empty((len(positions), 3, 3))
+    for row, recorded in enumerate(positions):
+        for joint, column in columns:
+            value = float(recorded[column])
+            angle = (np.cos(value), np.sin(value)) if joint.nq == 2 else (value,)
+            configuration[joint.idx_q : joint.idx_q + joint.nq] = angle
+        pin.framesForwardKinematics(model.model, data, configuration)
+        position[row], rotation[row] = data.oMf[frame].translation, data.oMf[frame].rotation
+    return Pose(position, rotation)
+
+
+def _joints(model: RobotModel, robot: str, frame: int, names: Sequence[str]) -> list[tuple[int, str]]:
+    supports = [int(i) for i in model.model.supports[model.model.frames[frame].parentJoint] if i > 0]
+    found = [(i, str(model.model.names[i])) for i in supports if str(model.model.names[i]) not in model.followers]
+    if any(name == ROOT_JOINT for _, name in found):
+        raise InputError(f"robot {robot}", "has a free base, whose pose joint states do not hold", "record the pose")
+    missing = [name for _, name in found if name not in names]
+    if missing:
+        raise InputError(
+            f"robot {robot}", f"needs the joints {', '.join(missing)}; recorded are {', '.join(names)}",
+            "choose the robot that was recorded, with its joint names",
+        )  # fmt: skip
     return found
-
-
-def _columns(model: pin.Model, bounded: Flags) -> tuple[list[int], list[int]]:
-    """Coordinates and velocities of the joints that limits bound."""
-    pairs = [(j.idx_q, j.idx_v) for j in list(model.joints)[1:] if j.nq == 1 and bounded[j.idx_q]]
-    return [p[0] for p in pairs], [p[1] for p in pairs]
-
-
-def _step(jacobian: Float, error: Float, held: Flags) -> Float:
-    """Levenberg-Marquardt step. Joints that stand at a limit are left out."""
-    jacobian = np.where(held, 0.0, jacobian)
-    damping = 0.5 * float(error @ error) + 1e-10
-    gain = jacobian @ jacobian.T
-    gain.flat[::7] += damping
-    result: Float = jacobian.T @ np.linalg.solve(gain, error)
-    return result

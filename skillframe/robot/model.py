@@ -1,13 +1,14 @@
-"""`RobotModel`: the nominal `pinocchio.Model` of a robot, its home and its tool frames.
+"""`RobotModel`: nominal `pinocchio.Model` of a robot with its home and tool frames.
 
-The model is built from a bare tree (links with their inertia, joints), written again from the checked URDF with the
-overlay of robot.toml in it; geometry plays no part, so meshes may be missing. A revolute joint without limits (or with
-equal or reversed ones) turns within +-2 pi, a prismatic one slides within +-10 m (our choice; the audit warns); no
-effort limit means unlimited.
+Without valid limits, revolute joints range over +-2 pi and prismatic ones over +-10 m, and effort is unlimited.
+
+Prismatic joints of loops whose coordinate grows as the rod slides in are reversed, because drives expect the opposite.
+With `[[loop]]`, a continuous joint has its angle for a coordinate instead of cosine and sine.
 """
 
 from __future__ import annotations
 
+import copy
 import math
 import os
 import sys
@@ -19,32 +20,36 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike
 
+from skillframe.config.units import meant
 from skillframe.errors import InputError, UnknownName
 from skillframe.frames import Float
-from skillframe.robot.joint_settings import JointDynamics
-from skillframe.robot.numbers import INERTIA
-from skillframe.robot.spec import LinkInertia, RobotSpec
-from skillframe.robot.surroundings import FIXTURE, TOOL
-from skillframe.robot.urdf import Joint, Urdf, read_urdf
+from skillframe.robot.pins import aimed, drawn
+from skillframe.robot.spec import RobotSpec
+from skillframe.robot.tables import FIXTURE, TOOL, Arm, JointDynamics
+from skillframe.robot.urdf import INERTIA, Joint, Urdf, read_urdf
 
-_LARGEST_MODEL = 300  # degrees of freedom; Pinocchio's data grows with the cube: 1.8 GB at 300
-_FREE_RANGE = {"revolute": 2.0 * math.pi, "prismatic": 10.0}
-ROOT_JOINT = "root_joint"
+_OUT = {
+    "x": pin.utils.rotate("y", math.pi / 2.0), "-x": pin.utils.rotate("y", -math.pi / 2.0),
+    "y": pin.utils.rotate("x", -math.pi / 2.0), "-y": pin.utils.rotate("x", math.pi / 2.0),
+    "-z": pin.utils.rotate("x", math.pi),
+}  # fmt: skip
+ROOT_JOINT, CONTINUOUS = "root_joint", "continuous"
+_FREE_RANGE = {"revolute": 2.0 * math.pi, "prismatic": 10.0, CONTINUOUS: 1e4}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RobotModel:
-    """A robot ready for kinematics and dynamics. It is nominal, whatever the simulated plant varies.
+    """Nominal robot model, whatever the simulated plant varies.
 
     Attributes:
-        urdf: the checked tree it was built from.
-        model: its gravity is -9.81 m/s^2 along base z.
+        urdf: the checked tree.
+        model: with gravity of -9.81 m/s^2 along base z.
         home: (nq,) configuration.
-        tool_frames: frame ids, one per arm in the order of `spec.arm`.
-        followers: joints that follow another (URDF mimic) in this model.
-        mimic_fallback: why mimic joints are independent here although they should follow; empty if they do.
+        tool_frames: frame ids in the order of `spec.arm`.
+        followers: mimic joints, without a coordinate. Those of a machine have one (`robot.loops.followers_of`).
+        mimic_fallback: why mimic joints are independent, or "".
+        turned: prismatic joints of loops that were reversed.
     """
 
     spec: RobotSpec
@@ -54,9 +59,10 @@ class RobotModel:
     tool_frames: tuple[int, ...]
     followers: tuple[str, ...] = ()
     mimic_fallback: str = ""
+    turned: tuple[str, ...] = ()
 
     def guided(self) -> RobotModel:
-        """The robot in a person's hands: an arm that takes positions yields as one that takes torques."""
+        """The robot while a teacher moves it: with a torque interface."""
         control = self.spec.control.guided()
         return self if control is self.spec.control else replace(self, spec=replace(self.spec, control=control))
 
@@ -76,33 +82,46 @@ def load_model(spec: RobotSpec) -> RobotModel:
     """Build the nominal model of a robot.
 
     Raises:
-        InputError: the URDF does not load, or robot.toml does not fit it.
-        UnknownName: robot.toml names a link, joint or frame that the URDF does not have.
+        InputError, UnknownName: the URDF does not load, or robot.toml does not fit it.
     """
-    urdf = read_urdf(spec.urdf)
+    drawing = drawn(read_urdf(spec.urdf), spec.loop, spec.strut, str(spec.folder / "robot.toml"))
+    urdf = locked(drawing, spec)
     for link in spec.inertia:
         if link not in urdf.links:
             raise UnknownName("link", link, urdf.links, f"named in {spec.name}'s [inertia]")
     _check_machine(spec, urdf)
-    wanted = mimic_joints(urdf) if spec.mimic else ()
+    wanted = mimic_joints(urdf) if spec.mimic and not spec.machine else ()
     model, fallback = _build(urdf, spec, bool(wanted))
-    _free_missing_limits(model)
-    _add_motors(model, spec)
-    tools = tuple(_frame(model, arm.tool_frame) for arm in spec.arm)
+    homes = spec
+    if turned := backwards(model, spec):
+        urdf, homes = turned_round(urdf, spec, turned)
+        model, fallback = _build(urdf, spec, bool(wanted))
+    for name in ("effortLimit", "velocityLimit"):  # zero means no limit
+        limit = getattr(model, name).copy()
+        limit[limit <= 0.0] = np.inf
+        setattr(model, name, limit)
+    single = {name: model.joints[j].idx_v for j, name in enumerate(model.names) if j and model.joints[j].nv == 1}
+    armature = model.armature.copy()  # inertia without weight, as of motors
+    for joint, inertia in spec.motor_inertia.items():
+        if joint not in single:
+            raise UnknownName("joint", joint, single, f"named in {spec.name}'s [motor_inertia]")
+        armature[single[joint]] = inertia
+    model.armature = armature
+    tools = tuple(_tool(model, arm) for arm in spec.arm)
     followers = () if fallback else wanted
     return RobotModel(
         spec=spec,
         urdf=urdf,
         model=model,
-        home=_home(model, spec, followers),
+        home=aimed(model, spec.strut, homes.home, _home(model, homes, followers)),
         tool_frames=tools,
         followers=followers,
         mimic_fallback=fallback,
+        turned=turned,
     )
 
 
 def _check_machine(spec: RobotSpec, urdf: Urdf) -> None:
-    """Names of links and joints in robot.toml, so that a slip is found by `robots check` and not by the first run."""
     if spec.payload is not None and spec.payload.link not in urdf.links:
         raise UnknownName("link", spec.payload.link, urdf.links, f"named in {spec.name}'s [payload]")
     for joint in spec.friction_share:
@@ -129,41 +148,32 @@ def _check_machine(spec: RobotSpec, urdf: Urdf) -> None:
 
 
 def mimic_joints(urdf: Urdf) -> tuple[str, ...]:
-    """Names of the joints that carry a mimic tag."""
+    """Names of the joints with a mimic tag."""
     return tuple(j.name for j in urdf.joints.values() if j.element.find("mimic") is not None and j.type != "fixed")
 
 
-def attach_payload(
-    model: pin.Model, tool_frame: int | str, mass: float, com: ArrayLike, inertia: ArrayLike
-) -> pin.Model:
-    """A copy of a model that carries a rigid load.
-
-    Args:
-        model: left as it is.
-        tool_frame: id or name of the frame that the load is fixed to.
-        mass: [kg].
-        com: (3,) centre of mass in the tool frame [m].
-        inertia: (3,) diagonal or (3, 3) about the centre of mass, tool frame axes [kg m^2].
-    """
-    frame = model.frames[_frame(model, tool_frame) if isinstance(tool_frame, str) else tool_frame]
-    about_com = np.asarray(inertia, dtype=float)
-    about_com = np.diag(about_com) if about_com.ndim == 1 else about_com
-    loaded = model.copy()
-    load = pin.Inertia(float(mass), np.asarray(com, dtype=float), about_com)
-    loaded.appendBodyToJoint(frame.parentJoint, load, frame.placement)
-    return loaded
-
-
-def _frame(model: pin.Model, name: str) -> int:
-    bodies = [f.name for f in model.frames if f.type != pin.FrameType.JOINT and f.name != "universe"]
-    if name not in bodies:
-        raise UnknownName("tool_frame", name, bodies, "a tool_frame is a link of the URDF")
-    return int(model.getFrameId(name, pin.FrameType.BODY))
+def _tool(model: pin.Model, arm: Arm) -> int:
+    body = arm.tool_frame
+    bodies = [f.name for f in model.frames if f.type == pin.FrameType.BODY and f.name != "universe"]
+    if body not in bodies:
+        joint = f"a joint is called {body!r}; " if model.existFrame(body) else ""
+        raise UnknownName("tool_frame", body, bodies, f"{joint}a tool_frame is a link of the URDF")
+    link = int(model.getFrameId(body, pin.FrameType.BODY))
+    if arm.tool_axis == "z":
+        return link
+    frame, turn = model.frames[link], pin.SE3.Identity()
+    turn.rotation = _OUT[arm.tool_axis]
+    name = f"{arm.tool_frame} with {arm.tool_axis} out"
+    placement = frame.placement * turn
+    return int(model.addFrame(pin.Frame(name, frame.parentJoint, link, placement, pin.FrameType.OP_FRAME)))
 
 
 def _build(urdf: Urdf, spec: RobotSpec, mimic: bool) -> tuple[pin.Model, str]:
-    """The model, and why mimic joints had to be made independent (empty if they follow)."""
-    _check_size(urdf)
+    moving = {"floating": 6, "planar": 3, "fixed": 0}
+    freedoms = sum(moving.get(joint.type, 1) for joint in urdf.joints.values())
+    if freedoms > 300:  # Pinocchio's data grows with the cube: 1.8 GB
+        text = f"has {freedoms} degrees of freedom; 300 is the most that dynamics are computed for"
+        raise InputError(urdf.path, text, "fix joints that do not matter")
     text = _bare_tree(urdf, spec)
     arguments = [text] if spec.base == "fixed" else [text, pin.JointModelFreeFlyer(), ROOT_JOINT]
     if mimic:
@@ -171,7 +181,7 @@ def _build(urdf: Urdf, spec: RobotSpec, mimic: bool) -> tuple[pin.Model, str]:
             with _silent() as log:
                 return pin.buildModelFromXML(*arguments, mimic=True), ""
         except (ValueError, RuntimeError) as error:
-            fallback = _first_line(log, error)
+            fallback = _continuous(urdf) or _first_line(log, error)
     try:
         with _silent() as log:
             return pin.buildModelFromXML(*arguments), fallback if mimic else ""
@@ -179,85 +189,50 @@ def _build(urdf: Urdf, spec: RobotSpec, mimic: bool) -> tuple[pin.Model, str]:
         raise InputError(urdf.path, f"is refused by Pinocchio ({_first_line(log, error)})", "correct it") from None
 
 
-def _check_size(urdf: Urdf) -> None:
-    moving = {"floating": 6, "planar": 3, "fixed": 0}
-    freedoms = sum(moving.get(joint.type, 1) for joint in urdf.joints.values())
-    if freedoms > _LARGEST_MODEL:
-        text = f"has {freedoms} degrees of freedom; {_LARGEST_MODEL} is the most that dynamics are computed for"
-        raise InputError(urdf.path, text, "fix joints that do not matter")
-
-
 def _bare_tree(urdf: Urdf, spec: RobotSpec) -> str:
-    """URDF text with inertias and joints only. [inertia] and [dynamics] replace a link's and a joint's own."""
     overlay = spec.inertia
     robot = ET.Element("robot", name=urdf.name)
     for name, link in urdf.links.items():
         bare = ET.SubElement(robot, "link", name=name)
         inertial = link.find("inertial")
         if name in overlay:
-            _write_inertia(bare, overlay[name])
+            inertia = overlay[name]
+            inertial = ET.SubElement(bare, "inertial")
+            ET.SubElement(inertial, "origin", xyz=" ".join(map(repr, inertia.com)))
+            ET.SubElement(inertial, "mass", value=repr(inertia.mass))
+            ET.SubElement(inertial, "inertia", dict(zip(INERTIA, map(repr, inertia.inertia), strict=True)))
         elif inertial is not None:
             bare.append(inertial)
     for joint in urdf.joints.values():
-        robot.append(_bare_joint(joint, spec.dynamics.joint.get(joint.name)))
+        robot.append(_bare_joint(joint, spec.dynamics.joint.get(joint.name), bool(spec.loop)))
     return ET.tostring(robot, encoding="unicode")
 
 
-def _write_inertia(link: ET.Element, inertia: LinkInertia) -> None:
-    inertial = ET.SubElement(link, "inertial")
-    ET.SubElement(inertial, "origin", xyz=" ".join(map(repr, inertia.com)))
-    ET.SubElement(inertial, "mass", value=repr(inertia.mass))
-    ET.SubElement(inertial, "inertia", dict(zip(INERTIA, map(repr, inertia.inertia), strict=True)))
-
-
-def _bare_joint(joint: Joint, own: JointDynamics | None) -> ET.Element:
-    bare = ET.Element("joint", name=joint.name, type=joint.type)
+def _bare_joint(joint: Joint, own: JointDynamics | None, angles: bool) -> ET.Element:
+    endless = joint.type == CONTINUOUS
+    bare = ET.Element("joint", name=joint.name, type="revolute" if angles and endless else joint.type)
     for tag in ("parent", "child", "origin", "axis", "mimic"):
         element = joint.element.find(tag)
         if element is not None:
             bare.append(element)
-    _add_dynamics(bare, joint.element.find("dynamics"), own)
-    limit = joint.element.find("limit")
-    given = {"effort": "0", "velocity": "0", **(limit.attrib if limit is not None else {})}
-    if joint.type in _FREE_RANGE and float(given.get("lower", 0.0)) >= float(given.get("upper", 0.0)):
-        given |= {"lower": repr(-_FREE_RANGE[joint.type]), "upper": repr(_FREE_RANGE[joint.type])}
-    if limit is not None or joint.type in _FREE_RANGE:
-        ET.SubElement(bare, "limit", {k: v for k, v in given.items() if k in ("effort", "velocity", "lower", "upper")})
-    return bare
-
-
-def _add_dynamics(bare: ET.Element, given: ET.Element | None, own: JointDynamics | None) -> None:
-    """Friction and damping as the URDF gives them, or as robot.toml does."""
-    values = dict(given.attrib) if given is not None else {}
+    resisting = joint.element.find("dynamics")
+    values = dict(resisting.attrib) if resisting is not None else {}
     for what in ("friction", "damping"):
         value = None if own is None else getattr(own, what)
         if value is not None:
             values[what] = repr(value)
     if values:
         ET.SubElement(bare, "dynamics", values)
-
-
-def _free_missing_limits(model: pin.Model) -> None:
-    """Effort and velocity limits of zero mean that none was given."""
-    for name in ("effortLimit", "velocityLimit"):
-        limit = getattr(model, name).copy()
-        limit[limit <= 0.0] = np.inf
-        setattr(model, name, limit)
-
-
-def _add_motors(model: pin.Model, spec: RobotSpec) -> None:
-    """The motors' inertia as Pinocchio's armature: on the diagonal of the mass matrix, and without weight."""
-    single = {name: model.joints[j].idx_v for j, name in enumerate(model.names) if j and model.joints[j].nv == 1}
-    armature = model.armature.copy()
-    for joint, inertia in spec.motor_inertia.items():
-        if joint not in single:
-            raise UnknownName("joint", joint, single, f"named in {spec.name}'s [motor_inertia]")
-        armature[single[joint]] = inertia
-    model.armature = armature
+    limit = joint.element.find("limit")
+    given = {"effort": "0", "velocity": "0", **(limit.attrib if limit is not None else {})}
+    if joint.type in _FREE_RANGE and (endless or float(given.get("lower", 0.0)) >= float(given.get("upper", 0.0))):
+        given |= {"lower": repr(-_FREE_RANGE[joint.type]), "upper": repr(_FREE_RANGE[joint.type])}
+    if limit is not None or joint.type in _FREE_RANGE:
+        ET.SubElement(bare, "limit", {k: v for k, v in given.items() if k in ("effort", "velocity", "lower", "upper")})
+    return bare
 
 
 def _home(model: pin.Model, spec: RobotSpec, followers: tuple[str, ...]) -> Float:
-    """Configuration with the named joints at home and every other as near to neutral as its limits allow."""
     q: Float = pin.neutral(model)
     lower, upper = model.lowerPositionLimit, model.upperPositionLimit
     movable = {n: j for j, n in enumerate(model.names) if j and model.joints[j].nv == 1 and n not in followers}
@@ -275,18 +250,20 @@ def _home(model: pin.Model, spec: RobotSpec, followers: tuple[str, ...]) -> Floa
         low, high = lower[joint.idx_q], upper[joint.idx_q]
         if low < high and not low - 1e-9 <= value <= high + 1e-9:
             where, text = spec.folder / "robot.toml", f"{value:g} is outside the joint's limits {low:g} to {high:g}"
-            raise InputError(f"{where}: home.{name}", text, "correct it")
+            unit = "m" if joint.shortname().startswith("JointModelP") else "rad"
+            words = meant(value, unit, lambda there, low=low, high=high: low <= there <= high)  # type: ignore[misc]
+            fix = f'did you mean "{value:g} {words[0]}"?' if words else "correct it"
+            raise InputError(f"{where}: home.{name}", text, fix)
         q[joint.idx_q] = value
     return q
 
 
 @contextmanager
 def _silent() -> Iterator[list[str]]:
-    """Catch what C++ parsers write to the process's stderr, so that the user reads one sentence."""
     lines: list[str] = []
     try:
         saved = os.dup(2)
-    except OSError:  # a process without stderr has nothing to catch
+    except OSError:
         yield lines
         return
     sys.stderr.flush()
@@ -301,6 +278,109 @@ def _silent() -> Iterator[list[str]]:
             lines.extend(catch.read().splitlines())
 
 
+def _continuous(urdf: Urdf) -> str:
+    for name in mimic_joints(urdf):
+        element = urdf.joints[name].element.find("mimic")
+        leader = urdf.joints.get("" if element is None else element.get("joint", ""))
+        for joint in (urdf.joints[name], leader):
+            if joint is not None and joint.type == "continuous":
+                return f"joint {joint.name!r} is {CONTINUOUS}, and a joint without limits neither follows nor leads"
+    return ""
+
+
 def _first_line(log: list[str], error: Exception) -> str:
-    spoken = [line.removeprefix("Error:").strip() for line in [*log, *str(error).splitlines()] if line.strip()]
+    lines = [line.removeprefix("Error:").strip() for line in [*log, *str(error).splitlines()] if line.strip()]
+    told = [line.partition(":")[2].strip() for line in lines if line.lower().startswith("message")]
+    spoken = told or [line for line in lines if not line.startswith(("From file", "in function", "at line"))]
     return spoken[0] if spoken else type(error).__name__
+
+
+def backwards(model: pin.Model, spec: RobotSpec) -> tuple[str, ...]:
+    """Driven prismatic joints whose rod end approaches the barrel's hinge as they grow."""
+    driven = {actuation.joint for actuation in spec.actuation}
+    found = []
+    for frame in {name for loop in spec.loop for name in (loop.frame_a, loop.frame_b) if model.existFrame(name)}:
+        eye = model.frames[model.getFrameId(frame)]
+        slider, name = eye.parentJoint, model.names[eye.parentJoint]
+        if name not in driven or not str(model.joints[slider].shortname()).startswith("JointModelP"):
+            continue
+        placement = model.jointPlacements[slider]
+        slide = placement.rotation @ np.array(model.joints[slider].createData().S, dtype=float).reshape(6)[:3]
+        rest = placement.act(np.array(eye.placement.translation))
+        if (rest + spec.home.get(name, 0.0) * slide) @ slide < 0.0:
+            found.append(name)
+    return tuple(sorted(found))
+
+
+def locked(urdf: Urdf, spec: RobotSpec) -> Urdf:
+    """The tree with the joints of `[lock]` fixed at their positions.
+
+    Raises:
+        UnknownName: names no such joint.
+        InputError: a joint that cannot be held there, or that is moved as well.
+    """
+    where, joints = spec.folder / "robot.toml", dict(urdf.joints)
+    plain = [name for name, joint in joints.items() if joint.type in ("revolute", "continuous", "prismatic")]
+    for name, value in spec.lock.items():
+        if name not in plain:
+            raise UnknownName("joint", name, plain, f"named in {spec.name}'s [lock]")
+        for table, moved in (("[home]", spec.home), ("[[actuation]]", [a.joint for a in spec.actuation])):
+            if name in moved:
+                raise InputError(
+                    where, f"{name} is held by [lock], and moved by {table}", "leave it out of one of them"
+                )
+        limit = joints[name].element.find("limit")
+        if limit is not None and joints[name].type != "continuous":
+            low, high = float(limit.get("lower", "0")), float(limit.get("upper", "0"))
+            if low < high and not low <= value <= high:
+                text = f"{value:g} is outside the joint's limits {low:g} to {high:g}"
+                raise InputError(f"{where}: lock.{name}", text, "correct it")
+        joints[name] = _held(joints[name], value)
+    return urdf._replace(joints=joints)
+
+
+def _held(joint: Joint, value: float) -> Joint:
+    """A fixed joint in place of one at a position [rad or m]."""
+    element = copy.deepcopy(joint.element)
+    origin, axis = element.find("origin"), element.find("axis")
+    if origin is None:
+        element.append(origin := element.makeelement("origin", {}))
+    place, turn = (
+        np.array([float(word) for word in origin.get(key, "0 0 0").split()]) for key in ("xyz", "rpy")
+    )  # fmt: skip
+    way = np.array([float(word) for word in (axis.get("xyz", "1 0 0") if axis is not None else "1 0 0").split()])
+    way, rotation = way / np.linalg.norm(way), pin.rpy.rpyToMatrix(*turn)
+    if joint.type == "prismatic":
+        place = place + rotation @ way * value
+    else:
+        rotation = rotation @ pin.exp3(way * value)
+    origin.set("xyz", " ".join(map(repr, place.tolist())))
+    origin.set("rpy", " ".join(map(repr, pin.rpy.matrixToRpy(rotation).tolist())))
+    element.set("type", "fixed")
+    for tag in ("axis", "limit", "mimic", "dynamics", "safety_controller"):
+        for part in element.findall(tag):
+            element.remove(part)
+    return joint._replace(type="fixed", element=element)
+
+
+def turned_round(urdf: Urdf, spec: RobotSpec, names: tuple[str, ...]) -> tuple[Urdf, RobotSpec]:
+    """Reverse the axes, limits and home of these joints in tree and declaration."""
+    joints = {name: _turned(joint) if name in names else joint for name, joint in urdf.joints.items()}
+    home = {name: -value if name in names else value for name, value in spec.home.items()}
+    return urdf._replace(joints=joints), replace(spec, home=home)
+
+
+def _turned(joint: Joint) -> Joint:
+    element = copy.deepcopy(joint.element)
+    axis = element.find("axis")
+    if axis is None:
+        axis = element.makeelement("axis", {})
+        element.append(axis)
+    x, y, z = (-float(word) for word in axis.get("xyz", "1 0 0").split())
+    axis.set("xyz", f"{x!r} {y!r} {z!r}")
+    limit = element.find("limit")
+    if limit is not None:
+        low, high = float(limit.get("lower", "0")), float(limit.get("upper", "0"))
+        limit.set("lower", repr(-high))
+        limit.set("upper", repr(-low))
+    return joint._replace(element=element)

@@ -1,34 +1,31 @@
-r"""A robot's payload as a parameter.
+r"""Payload of a robot as a parameter.
 
-robot.toml's `[payload]` names the link that carries it and how much of the link's mass it is. Where only the sum of
-link and load is published, with its centre of mass and inertia, another load m scales the link's whole spatial inertia,
+A load m other than that of robot.toml's `[payload]` scales the inertia of link and load,
 
     I(m) = I_published (m_link - m_declared + m) / m_link,
 
-which keeps centre of mass and radii of gyration (our choice: nothing else can be said) and returns the published
-figures for the declared load.
+because only their sum is published.
 """
 
 from __future__ import annotations
 
 import dataclasses
 
+import pinocchio as pin
+
 from skillframe.errors import InputError, UnknownName
-from skillframe.robot.numbers import INERTIA
+from skillframe.frames import Float
+from skillframe.robot.model import RobotModel, load_model
 from skillframe.robot.spec import LinkInertia, RobotSpec
-from skillframe.robot.urdf import read_urdf
+from skillframe.robot.urdf import INERTIA, read_urdf
 
 
 def with_payload(spec: RobotSpec, mass: float) -> RobotSpec:
-    """The robot carrying another payload.
-
-    Args:
-        spec: has a `payload`.
-        mass: of the payload [kg].
+    """Return the robot with another payload [kg].
 
     Raises:
-        InputError: the robot declares no payload; the mass is negative or above the rating.
-        UnknownName: the declared link is not in the URDF.
+        InputError: no payload is declared, or the mass is negative or above the rating.
+        UnknownName: the URDF lacks the declared link.
     """
     where = f"{spec.folder / 'robot.toml'}: payload"
     if spec.payload is None:
@@ -36,7 +33,7 @@ def with_payload(spec: RobotSpec, mass: float) -> RobotSpec:
     if not 0.0 <= mass <= spec.payload.rating:
         text = f"{mass:g} kg is not within 0 and the rating of {spec.payload.rating:g} kg"
         raise InputError(where, text, "carry less")
-    mass = float(mass)  # numpy's own is written into the URDF by a name that no parser reads
+    mass = float(mass)  # the repr of NumPy scalars is not valid in a URDF
     link, published = spec.payload.link, published_inertia(spec)
     left = published.mass - spec.payload.mass
     if left < 0.0:
@@ -51,7 +48,7 @@ def with_payload(spec: RobotSpec, mass: float) -> RobotSpec:
 
 
 def published_inertia(spec: RobotSpec) -> LinkInertia:
-    """Inertia of the link that carries the load, from robot.toml's overlay or else the URDF."""
+    """Inertia of the payload's link, from robot.toml's overlay or else the URDF."""
     assert spec.payload is not None
     name = spec.payload.link
     if name in spec.inertia:
@@ -70,3 +67,26 @@ def published_inertia(spec: RobotSpec) -> LinkInertia:
     values = {key: float(inertia.get(key, 0.0)) for key in INERTIA}
     in_order = tuple(values[key] for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz"))
     return LinkInertia(mass=float(mass.get("value", 0.0)), com=com, inertia=in_order)  # type: ignore[arg-type]
+
+
+def loaded_inertias(robot: RobotModel, masses: Float) -> tuple[str, list[pin.Inertia]]:
+    """Joint that moves the payload, and the inertia moving with it for masses (N,) [kg].
+
+    The inertia is linear in the mass.
+
+    Raises:
+        InputError, UnknownName: see `with_payload`.
+    """
+    for mass in masses:
+        with_payload(robot.spec, float(mass))
+    payload = robot.spec.payload
+    assert payload is not None
+    joint = robot.model.frames[robot.model.getFrameId(payload.link, pin.FrameType.BODY)].parentJoint
+    empty, full = (
+        load_model(with_payload(robot.spec, mass)).model.inertias[joint].toDynamicParameters()
+        for mass in (0.0, payload.rating)
+    )
+    per_kilogram = (full - empty) / max(payload.rating, 1e-9)
+    return str(robot.model.names[joint]), [
+        pin.Inertia.FromDynamicParameters(empty + float(mass) * per_kilogram) for mass in masses
+    ]

@@ -1,28 +1,121 @@
-"""A URDF as a checked tree of links and joints, read without any robot library.
+"""Reading of a URDF as a checked tree of links and joints, without any robot library.
 
-Everything that would make a URDF parser fail, print to the terminal or crash is found here first and said in one
-sentence: markup errors, document types (entity bombs), missing or doubled names, unknown joint types, cycles, several
-roots, numbers that are none. Prefixed elements (`xacro:`, `sensor:`) need no declared namespace, as URDF parsers do.
+It reports everything that would make a URDF parser fail or crash, in one sentence.
 """
 
 from __future__ import annotations
 
+import math
 import xml.etree.ElementTree as ET
 from pathlib import Path
-from typing import NamedTuple, NoReturn
-from xml.parsers import expat
+from typing import NamedTuple
 
 from skillframe.errors import InputError, UnknownName
-from skillframe.robot.numbers import check_joint_numbers, check_link_numbers
+from skillframe.files.documents import parse_xml, read_bytes
+
+LARGEST = 1e15  # SI; squares and products still fit a double
+INERTIA = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+_JOINT_NUMBERS = {
+    "limit": ("lower", "upper", "effort", "velocity"),
+    "mimic": ("multiplier", "offset"),
+    "dynamics": ("damping", "friction"),
+}
+_SHAPES = {
+    "box": {"size": 3},
+    "cylinder": {"radius": 1, "length": 1},
+    "sphere": {"radius": 1},
+    "capsule": {"radius": 1, "length": 1},
+}
+
+
+def numbers(element: ET.Element | None, attribute: str, count: int, default: tuple[float, ...]) -> tuple[float, ...]:
+    """Numbers of an attribute, or `default` if absent. Raises `ValueError` for anything else."""
+    text = element.get(attribute) if element is not None else None
+    if text is None:
+        return default
+    values = tuple(float(word) for word in text.split())
+    if len(values) != count or not all(map(math.isfinite, values)) or "_" in text:
+        raise ValueError(text)
+    return values
+
+
+def check_link_numbers(path: Path, name: str, link: ET.Element) -> None:
+    """Check the inertia and geometry of a link.
+
+    Raises:
+        InputError: a number is missing or invalid.
+    """
+    where = f"{path}: link {name!r}"
+    inertial = link.find("inertial")
+    if inertial is not None:
+        _check_origin(where + " inertial", inertial)
+        _required(where + " inertial", inertial, "mass", ("value",))
+        _required(where + " inertial", inertial, "inertia", INERTIA)
+    for drawn in [*link.findall("visual"), *link.findall("collision")]:
+        _check_origin(f"{where} {drawn.tag}", drawn)
+        for shape in drawn.findall("geometry/*"):
+            for attribute, count in _SHAPES.get(shape.tag, {}).items():
+                _check(f"{where} {drawn.tag} {shape.tag}", shape, attribute, count, required=True)
+
+
+def check_joint_numbers(path: Path, name: str, joint: ET.Element) -> None:
+    """Check the origin, axis, limits and couplings of a joint.
+
+    Raises:
+        InputError: a number is invalid.
+    """
+    where = f"{path}: joint {name!r}"
+    _check_origin(where, joint)
+    axis = joint.find("axis")
+    if axis is not None:
+        _check(f"{where} axis", axis, "xyz", 3, required=True)
+    for tag, attributes in _JOINT_NUMBERS.items():
+        element = joint.find(tag)
+        for attribute in attributes if element is not None else ():
+            _check(f"{where} {tag}", element, attribute, 1)
+    limit = joint.find("limit")
+    for attribute in ("effort", "velocity"):
+        if numbers(limit, attribute, 1, (0.0,))[0] < 0.0:
+            raise InputError(f"{where} limit", f"{attribute} is below zero", "give its size")
+    mimic = joint.find("mimic")
+    if mimic is not None and not mimic.get("joint"):
+        raise InputError(f"{where} mimic", "names no joint to follow", 'write <mimic joint="..."/>')
+
+
+def _check_origin(where: str, element: ET.Element) -> None:
+    origin = element.find("origin")
+    if origin is not None:
+        _check(f"{where} origin", origin, "xyz", 3)
+        _check(f"{where} origin", origin, "rpy", 3)
+
+
+def _required(where: str, parent: ET.Element, tag: str, attributes: tuple[str, ...]) -> None:
+    element = parent.find(tag)
+    if element is None:
+        raise InputError(where, f"has no <{tag}>", f"add it, or remove <{parent.tag}>")
+    for attribute in attributes:
+        _check(f"{where} {tag}", element, attribute, 1, required=True)
+
+
+def _check(where: str, element: ET.Element | None, attribute: str, count: int, required: bool = False) -> None:
+    given = element.get(attribute) if element is not None else None
+    if required and given is None:
+        raise InputError(where, f"has no {attribute!r}", "add it")
+    try:
+        large = max((abs(x) for x in numbers(element, attribute, count, ())), default=0.0)
+    except ValueError:
+        wanted = "one finite number" if count == 1 else f"{count} finite numbers"
+        raise InputError(f"{where}: {attribute}", f"expected {wanted}, got {given!r}", "correct it") from None
+    if large > LARGEST and not where.endswith("limit"):
+        raise InputError(f"{where}: {attribute}", f"{given} is beyond any physical size", "correct it")
+
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 _OTHER_FORMATS = {"sdf": "an SDF model", "mujoco": "a MuJoCo model", "COLLADA": "a COLLADA mesh", "KinBody": "OpenRAVE"}
-_LARGEST_FILE = 64 * 2**20  # bytes; the largest humanoids are below 1 MB
-_DEEPEST_CHAIN = 1000  # links; parsers recurse per link and overflow their stack near 4000
 
 
 class Joint(NamedTuple):
-    """A joint: its name, type and the names of the links that it joins."""
+    """A joint with the names of its links."""
 
     name: str
     type: str
@@ -45,7 +138,7 @@ class Urdf(NamedTuple):
     root: str
 
     def children(self) -> dict[str, list[Joint]]:
-        """Joints whose parent is each link."""
+        """Child joints of each link."""
         hanging: dict[str, list[Joint]] = {link: [] for link in self.links}
         for joint in self.joints.values():
             hanging[joint.parent].append(joint)
@@ -56,68 +149,9 @@ def read_urdf(path: Path) -> Urdf:
     """Read and check a URDF.
 
     Raises:
-        InputError: it cannot be loaded; says what, where and what to do.
+        InputError: it cannot be loaded.
     """
     root = parse_xml(path, read_bytes(path))
-    _check_root(path, root)
-    links = _links(path, root)
-    joints = _joints(path, root, links)
-    return Urdf(path, root.get("name") or path.stem, links, joints, _find_root(path, links, joints))
-
-
-def read_bytes(path: Path, kind: str = "a URDF") -> bytes:
-    """The content of an XML file, which is not empty, not binary and not huge.
-
-    Raises:
-        InputError: it is, or cannot be read. `kind` is what it ought to be.
-    """
-    if path.is_dir():
-        raise InputError(path, "is a folder", f"give {kind} file in it")
-    try:
-        if path.stat().st_size > _LARGEST_FILE:
-            raise InputError(path, "is larger than 64 MB", f"is it {kind}?")
-        content = path.read_bytes()
-    except OSError as error:
-        raise InputError(path, f"cannot be read ({error.strerror})", "check the path") from None
-    if not content.strip():
-        raise InputError(path, "is empty", f"give {kind}")
-    if b"\0" in content[:1024] and content[:2] not in (b"\xff\xfe", b"\xfe\xff"):
-        raise InputError(path, f"is a binary file, not {kind}", f"give {kind} itself, which is XML text")
-    return content
-
-
-def parse_xml(path: Path, content: bytes, text: bool = False) -> ET.Element:
-    """The element tree, built on expat without namespaces. A document type is refused before its entities expand.
-
-    Args:
-        path: of the file, for messages.
-        content: what it holds.
-        text: keep what stands between elements, which says nothing in a URDF.
-
-    Raises:
-        InputError: it is no XML, or has a document type.
-    """
-    builder, parser = ET.TreeBuilder(), expat.ParserCreate()
-
-    def refuse(*_: object) -> NoReturn:
-        raise InputError(f"{path}: line {parser.CurrentLineNumber}", "has a document type (DOCTYPE)", "remove it")
-
-    parser.StartDoctypeDeclHandler = refuse
-    parser.StartElementHandler = builder.start
-    parser.EndElementHandler = builder.end
-    if text:
-        parser.CharacterDataHandler = builder.data
-    try:
-        parser.Parse(content, True)
-    except expat.ExpatError as error:
-        where = f"{path}: line {error.lineno}"
-        raise InputError(where, f"is not valid XML ({expat.ErrorString(error.code)})", "correct that line") from None
-    except (LookupError, ValueError) as error:
-        raise InputError(path, f"is in an encoding that cannot be read ({error})", "save it as UTF-8") from None
-    return builder.close()
-
-
-def _check_root(path: Path, root: ET.Element) -> None:
     if root.tag != "robot":
         kind = _OTHER_FORMATS.get(root.tag, f"an XML file of <{root.tag}>")
         raise InputError(path, f"is {kind}, not a URDF (its first element must be <robot>)", "give a URDF")
@@ -129,9 +163,6 @@ def _check_root(path: Path, root: ET.Element) -> None:
             raise InputError(
                 path, "is a xacro, not yet a URDF", f"type: xacro {path.name} > {path.stem.split('.')[0]}.urdf"
             )
-
-
-def _links(path: Path, root: ET.Element) -> dict[str, ET.Element]:
     links: dict[str, ET.Element] = {}
     for element in root.findall("link"):
         name = _name(path, element, links)
@@ -139,10 +170,6 @@ def _links(path: Path, root: ET.Element) -> dict[str, ET.Element]:
         links[name] = element
     if not links:
         raise InputError(path, "has no link", "give a URDF with at least one <link>")
-    return links
-
-
-def _joints(path: Path, root: ET.Element, links: dict[str, ET.Element]) -> dict[str, Joint]:
     joints: dict[str, Joint] = {}
     for element in root.findall("joint"):
         name = _name(path, element, joints)
@@ -153,7 +180,7 @@ def _joints(path: Path, root: ET.Element, links: dict[str, ET.Element]) -> dict[
         ends = [_end(path, name, element, end, links) for end in ("parent", "child")]
         check_joint_numbers(path, name, element)
         joints[name] = Joint(name, kind, ends[0], ends[1], element)
-    return joints
+    return Urdf(path, root.get("name") or path.stem, links, joints, _find_root(path, links, joints))
 
 
 def _name(path: Path, element: ET.Element, taken: dict[str, ET.Element] | dict[str, Joint]) -> str:
@@ -178,7 +205,6 @@ def _end(path: Path, joint: str, element: ET.Element, end: str, links: dict[str,
 
 
 def _find_root(path: Path, links: dict[str, ET.Element], joints: dict[str, Joint]) -> str:
-    """The one link without a parent, from which every other can be reached."""
     parent: dict[str, Joint] = {}
     for joint in joints.values():
         if joint.child in parent:
@@ -192,15 +218,6 @@ def _find_root(path: Path, links: dict[str, ET.Element], joints: dict[str, Joint
     roots = [link for link in links if link not in parent]
     if len(roots) > 1:
         raise InputError(path, f"has {len(roots)} root links ({_some(roots)})", "join them with a fixed joint")
-    loose = _unreached(path, roots, joints)
-    if not roots or (loose < set(links) and loose):
-        text = f"its links form a cycle ({_some(sorted(loose))})" + ("" if roots else ", so there is no root link")
-        raise InputError(path, text, "cut one joint; closed chains go into robot.toml as [[loop]]")
-    return roots[0]
-
-
-def _unreached(path: Path, roots: list[str], joints: dict[str, Joint]) -> set[str]:
-    """Links that cannot be reached from the root."""
     hanging: dict[str, list[str]] = {}
     for joint in joints.values():
         hanging.setdefault(joint.parent, []).append(joint.child)
@@ -209,11 +226,12 @@ def _unreached(path: Path, roots: list[str], joints: dict[str, Joint]) -> set[st
         layer = [child for link in layer for child in hanging.get(link, [])]
         loose -= set(layer)
         depth += 1
-        if depth > _DEEPEST_CHAIN:
-            raise InputError(
-                path, f"is a chain of more than {_DEEPEST_CHAIN} links", "merge links that are fixed together"
-            )
-    return loose
+        if depth > 1000:  # parsers recurse by link and overflow the stack near 4000
+            raise InputError(path, "is a chain of more than 1000 links", "merge links that are fixed together")
+    if not roots or (loose < set(links) and loose):
+        text = f"its links form a cycle ({_some(sorted(loose))})" + ("" if roots else ", so there is no root link")
+        raise InputError(path, text, "cut one joint; closed chains go into robot.toml as [[loop]]")
+    return roots[0]
 
 
 def _some(names: list[str]) -> str:

@@ -1,1 +1,1 @@
-"""Worlds: scenes as data, the batched MuJoCo plant, sensors and rates."""
+"""Worlds: scenes, the batched MuJoCo plant, sensors and rates."""

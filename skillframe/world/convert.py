@@ -1,37 +1,38 @@
-"""A MuJoCo model out of a `pinocchio.Model` and a scene: one URDF parser for plant and controller.
+"""MuJoCo model from a `pinocchio.Model` and a scene.
 
-Joints, placements and inertias are taken from the Pinocchio model, so that the mass matrix and bias forces of the two
-agree to rounding (tested to 1e-10). The contact preset is locked: it was chosen by measurement (no chatter while
-sliding, no creep of jammed pegs) and a test holds it.
+Both models share joints, placements and inertias. The contact parameters avoid chatter in sliding and creep of jammed
+pegs.
+
+Each `[[loop]]` becomes a `connect` constraint and each mimic joint of a machine a `joint` constraint, integrated with
+Runge-Kutta 4: the error of the first-order integrator would dominate (10 mm instead of 0.002 mm at the tip).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
 import numpy as np
 import pinocchio as pin
 
-from skillframe.errors import SkillframeError
+from skillframe.errors import SkillframeError, UnknownName
 from skillframe.frames import matrix_from_quaternion, quaternion_from_matrix
+from skillframe.robot.loops import followers_of
 from skillframe.robot.model import RobotModel
-from skillframe.robot.mount import Mount
-from skillframe.world.loops import close_loops
+from skillframe.robot.tables import LoopClosure
 from skillframe.world.scene import Geom, Holder, Mover, Scene, Sprung, Tool
 from skillframe.world.surfaces import number_of
 
 TIMESTEP = 0.001
 SOLREF = (0.004, 1.0)  # 4 time steps, critically damped
-SOLIMP = (0.01, 0.95, 1e-4, 0.5, 1.0)  # impedance ramps up from almost nothing at touch: no chatter
-IMPRATIO = 20.0  # friction stiff enough that a jammed peg does not creep in
+SOLIMP = (0.01, 0.95, 1e-4, 0.5, 1.0)  # impedance rises from almost zero at touch, against chatter
 FIXTURE, TOOL, SENSOR, SECOND = "fixture", "tool", "sensor", "second_sensor"
-BASE = "robot_base"  # what does not move of the robot; nothing but drawn
-SPRUNG = "sprung_"  # what the names of the bodies and joints of sprung parts begin with
-MOUNT = SPRUNG + "mount_"  # and those of a soft mount's joints, between sensor and tool
-MOVER, MOVER_MEETS = 1 | 4, 2 | 4  # contype and conaffinity of second parts: the tool, and each other
-FASTEST_SWING = 1.2  # rad a time step, of the tool on a soft mount: semi-implicit Euler is stable up to 2
-STICTION_SOLREF, STICTION_SOLIMP = (0.004, 1.0), (0.99, 0.999, 1e-3, 0.5, 2.0)  # joint friction that hardly creeps
+BASE = "robot_base"  # fixed parts of the robot
+SPRUNG = "sprung_"  # prefix of sprung parts
+MOUNT = SPRUNG + "mount_"  # prefix of the joints of a soft mount
+FASTEST_SWING = 1.2  # rad a time step, of the tool on a soft mount: semi-implicit Euler is stable to 2
+STICTION_SOLREF, STICTION_SOLIMP = (0.004, 1.0), (0.99, 0.999, 1e-3, 0.5, 2.0)  # joint friction with little creep
 _KINDS = {
     "box": mujoco.mjtGeom.mjGEOM_BOX, "sphere": mujoco.mjtGeom.mjGEOM_SPHERE, "plane": mujoco.mjtGeom.mjGEOM_PLANE,
     "capsule": mujoco.mjtGeom.mjGEOM_CAPSULE, "cylinder": mujoco.mjtGeom.mjGEOM_CYLINDER,
@@ -40,18 +41,40 @@ _KINDS = {
 
 
 def wxyz(quaternion: Any) -> list[float]:
-    """MuJoCo's order out of ours."""
+    """Quaternion in MuJoCo's order."""
     x, y, z, w = (float(v) for v in quaternion)
     return [w, x, y, z]
 
 
 def build_spec(robot: RobotModel, scene: Scene, timestep: float = TIMESTEP) -> mujoco.MjSpec:
-    """The robot holding the scene's tool, with the scene's fixture in its second hand or placed per trial."""
+    """MuJoCo spec of the robot with the scene's tool, and the fixture as mocap body or in the second arm."""
     spec = mujoco.MjSpec()
     spec.modelname = f"{robot.spec.name} in {scene.name}"
-    _set_options(spec, timestep)
-    bodies = _add_robot(spec, robot.model)
+    spec.compiler.degree = False
+    spec.option.timestep = timestep
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.impratio = 20.0  # stiff friction, against creep of a jammed peg
+    spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
+    spec.option.iterations = 50
+    spec.option.tolerance = 1e-10
+    spec.option.noslip_iterations = 0
+    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # a reset would hide divergence
+    spec.memory = 2 * 1024 * 1024  # the default of 13.6 MB a trial is too much for 256 trials
+    model = robot.model
+    spec.option.gravity = np.array(model.gravity.linear)
+    spec.worldbody.add_body(name=BASE)
+    bodies: dict[int, Any] = {0: spec.worldbody}
+    for joint in range(1, model.njoints):
+        body = bodies[model.parents[joint]].add_body(name=model.names[joint])
+        placement = model.jointPlacements[joint]
+        body.pos = placement.translation
+        body.quat = wxyz(quaternion_from_matrix(placement.rotation))
+        set_inertia(body, model.inertias[joint])
+        _add_joint(body, model, joint)
+        bodies[joint] = body
     close_loops(spec, robot.model, robot.spec.loop, bodies)
+    couple_followers(spec, robot)
     _add_tool(spec, robot, scene, bodies)
     fixture = _add_holder(spec, robot, scene.holder, bodies) if scene.holder and held(robot, scene) else None
     fixture = fixture or spec.worldbody.add_body(name=FIXTURE, mocap=True)
@@ -66,7 +89,6 @@ def build_spec(robot: RobotModel, scene: Scene, timestep: float = TIMESTEP) -> m
 
 
 def _add_mover(spec: mujoco.MjSpec, fixture: Any, part: Mover, friction: float) -> None:
-    """A second part of the fixture on its joint. A free one is three slides and a ball at its centre of mass."""
     name = SPRUNG + part.name
     body = fixture.add_body(name=name)
     set_inertia(body, pin.Inertia(part.mass, np.array(part.center_of_mass), part.inertia))
@@ -83,16 +105,15 @@ def _add_mover(spec: mujoco.MjSpec, fixture: Any, part: Mover, friction: float) 
         if part.range is not None:
             joint.limited, joint.range = True, part.range
             joint.solref_limit, joint.solimp_limit = STICTION_SOLREF, STICTION_SOLIMP
-    meets = MOVER_MEETS
-    if part.joint == "free":  # rests on the fixture, whose child it is: MuJoCo would leave that pair out
+    meets = 2 | 4  # tool and other movers
+    if part.joint == "free":  # MuJoCo would otherwise filter contacts with its parent, the fixture
         meets |= 1
         spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_FILTERPARENT
     for index, geom in enumerate(part.geoms):
-        add_geom(spec, body, geom, f"{name}_{index}", contype=MOVER, conaffinity=meets, friction=friction)
+        add_geom(spec, body, geom, f"{name}_{index}", contype=1 | 4, conaffinity=meets, friction=friction)
 
 
 def _add_sprung(spec: mujoco.MjSpec, fixture: Any, part: Sprung, friction: float) -> None:
-    """A part of the fixture on a slide joint: spring, damper, no weight."""
     name = SPRUNG + part.name
     body = fixture.add_body(name=name, gravcomp=1.0)
     set_inertia(body, pin.Inertia(part.mass, np.zeros(3), part.mass * np.eye(3)))
@@ -104,41 +125,12 @@ def _add_sprung(spec: mujoco.MjSpec, fixture: Any, part: Sprung, friction: float
 
 
 def held(robot: RobotModel, scene: Scene) -> bool:
-    """Does the robot's second arm hold the fixture?"""
+    """Whether the robot's second arm holds the fixture."""
     return scene.holder is not None and len(robot.tool_frames) > 1
 
 
-def _set_options(spec: mujoco.MjSpec, timestep: float) -> None:
-    spec.compiler.degree = False
-    spec.option.timestep = timestep
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    spec.option.impratio = IMPRATIO
-    spec.option.solver = mujoco.mjtSolver.mjSOL_NEWTON
-    spec.option.iterations = 50
-    spec.option.tolerance = 1e-10
-    spec.option.noslip_iterations = 0
-    spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET  # or a diverging trial would start over unseen
-    spec.memory = 2 * 1024 * 1024  # the default arena of 13.6 MB a trial trips memory limits at 256 trials
-
-
-def _add_robot(spec: mujoco.MjSpec, model: pin.Model) -> dict[int, Any]:
-    spec.option.gravity = np.array(model.gravity.linear)
-    spec.worldbody.add_body(name=BASE)
-    bodies: dict[int, Any] = {0: spec.worldbody}
-    for joint in range(1, model.njoints):
-        body = bodies[model.parents[joint]].add_body(name=model.names[joint])
-        placement = model.jointPlacements[joint]
-        body.pos = placement.translation
-        body.quat = wxyz(quaternion_from_matrix(placement.rotation))
-        set_inertia(body, model.inertias[joint])
-        _add_joint(body, model, joint)
-        bodies[joint] = body
-    return bodies
-
-
 def set_inertia(body: Any, inertia: pin.Inertia) -> None:
-    """Give a body a mass, centre of mass and full inertia about it."""
+    """Set a body's mass, centre of mass and inertia."""
     body.mass = inertia.mass
     body.ipos = inertia.lever
     i = inertia.inertia
@@ -173,34 +165,24 @@ def _add_joint(body: Any, model: pin.Model, index: int) -> None:
 def _add_tool(spec: mujoco.MjSpec, robot: RobotModel, scene: Scene, bodies: dict[int, Any]) -> None:
     body = _mount(robot, 0, bodies, SENSOR).add_body(name=TOOL)
     if robot.spec.mount is not None:
-        _add_mount(body, robot.spec.mount, scene.tool, spec.option.timestep)
+        turning = np.diag(tool_inertia(scene.tool).matrix())[3:]
+        for kind, stiffness, loads in (
+            (mujoco.mjtJoint.mjJNT_SLIDE, robot.spec.mount.stiffness, np.full(3, scene.tool.mass)),
+            (mujoco.mjtJoint.mjJNT_HINGE, robot.spec.mount.turning_stiffness, turning),
+        ):
+            for letter, axis, load in zip("xyz", np.eye(3), loads, strict=True):
+                made = body.add_joint(name=f"{MOUNT}{kind.name[6:].lower()}_{letter}", axis=axis, type=kind)
+                made.stiffness = [stiffness, 0.0, 0.0]
+                least = stiffness * (spec.option.timestep / FASTEST_SWING) ** 2
+                made.armature = max(least - load, 0.0)  # else the tool would swing too fast for the time step
+                made.damping = [2.0 * robot.spec.mount.damping_ratio * np.sqrt(stiffness * max(load, least)), 0.0, 0.0]
     set_inertia(body, tool_inertia(scene.tool))
     for index, geom in enumerate(scene.tool.geoms):
         add_geom(spec, body, geom, f"{TOOL}_{index}", contype=2, conaffinity=1, friction=scene.friction)
     _add_sensors(spec, SENSOR)
 
 
-def _add_mount(body: Any, mount: Mount, tool: Tool, timestep: float) -> None:
-    """Springs and dampers of a soft mount: three ways, then three turns about the tool frame's axes.
-
-    What would swing faster than the simulation can follow, as a slender tool about its axis, gets the inertia that it
-    lacks: some 190 Hz are beyond what an arm or its sensor's filter sees (our choice).
-    """
-    turning = np.diag(tool_inertia(tool).matrix())[3:]
-    for kind, stiffness, loads in (
-        (mujoco.mjtJoint.mjJNT_SLIDE, mount.stiffness, np.full(3, tool.mass)),
-        (mujoco.mjtJoint.mjJNT_HINGE, mount.turning_stiffness, turning),
-    ):
-        for letter, axis, load in zip("xyz", np.eye(3), loads, strict=True):
-            made = body.add_joint(name=f"{MOUNT}{kind.name[6:].lower()}_{letter}", axis=axis, type=kind)
-            made.stiffness = [stiffness, 0.0, 0.0]
-            least = stiffness * (timestep / FASTEST_SWING) ** 2
-            made.armature = max(least - load, 0.0)
-            made.damping = [2.0 * mount.damping_ratio * np.sqrt(stiffness * max(load, least)), 0.0, 0.0]
-
-
 def _add_holder(spec: mujoco.MjSpec, robot: RobotModel, holder: Holder, bodies: dict[int, Any]) -> Any:
-    """The fixture as a body in the second arm's grip. The joint friction of that arm makes it hold still."""
     body = _mount(robot, 1, bodies, SECOND).add_body(name=FIXTURE)
     body.pos, body.quat = holder.position, wxyz(holder.quaternion)
     in_hand = pin.SE3(matrix_from_quaternion(holder.quaternion), np.array(holder.position))
@@ -212,7 +194,6 @@ def _add_holder(spec: mujoco.MjSpec, robot: RobotModel, holder: Holder, bodies: 
 
 
 def _mount(robot: RobotModel, arm: int, bodies: dict[int, Any], name: str) -> Any:
-    """The body of an arm's tool frame, where its force-torque sensor sits."""
     frame = robot.model.frames[robot.tool_frames[arm]]
     mount = bodies[frame.parentJoint].add_body(name=name)
     mount.pos = frame.placement.translation
@@ -227,14 +208,14 @@ def _add_sensors(spec: mujoco.MjSpec, site: str) -> None:
 
 
 def tool_inertia(tool: Tool) -> pin.Inertia:
-    """The tool's spatial inertia in the tool frame."""
+    """Spatial inertia of the tool in its frame."""
     return pin.Inertia(tool.mass, np.array(tool.center_of_mass), np.diag(tool.inertia))
 
 
 def add_geom(
     spec: mujoco.MjSpec, body: Any, geom: Geom, name: str, *, contype: int, conaffinity: int, friction: float
 ) -> None:
-    """Add one geom of a scene to a MuJoCo body. Geoms that do not collide are only drawn."""
+    """Add a geom of a scene to a body. Geoms that do not collide are only drawn."""
     made = body.add_geom(
         name=name, type=_KINDS[geom.kind], pos=geom.position, quat=wxyz(geom.quaternion), rgba=geom.rgba
     )
@@ -245,7 +226,14 @@ def add_geom(
         if geom.surface is None:
             mesh.uservert = geom.vertices.ravel()
         else:
-            _add_surface(spec, mesh, made, geom)
+            assert geom.vertices is not None
+            assert geom.surface is not None
+            low, high = geom.vertices.min(axis=0), geom.vertices.max(axis=0)
+            mesh.uservert = np.array([[(low, high)[(c >> x) & 1][x] for x in range(3)] for c in range(8)]).ravel()
+            mesh.needsdf, mesh.octree_maxdepth = True, 1
+            made.type = mujoco.mjtGeom.mjGEOM_SDF
+            spec.nuser_geom = 1
+            made.userdata = [float(number_of(geom.surface))]
     else:
         made.size[: len(geom.size)] = geom.size
     made.contype, made.conaffinity = (contype, conaffinity) if geom.collide else (0, 0)
@@ -256,13 +244,46 @@ def add_geom(
     made.mass = 0.0
 
 
-def _add_surface(spec: mujoco.MjSpec, mesh: Any, made: Any, geom: Geom) -> None:
-    """A geom that our contact generator knows by its number. Of its shape MuJoCo needs no more than a box around it."""
-    assert geom.vertices is not None
-    assert geom.surface is not None
-    low, high = geom.vertices.min(axis=0), geom.vertices.max(axis=0)
-    mesh.uservert = np.array([[(low, high)[(c >> x) & 1][x] for x in range(3)] for c in range(8)]).ravel()
-    mesh.needsdf, mesh.octree_maxdepth = True, 1
-    made.type = mujoco.mjtGeom.mjGEOM_SDF
-    spec.nuser_geom = 1
-    made.userdata = [float(number_of(geom.surface))]
+def close_loops(spec: mujoco.MjSpec, model: pin.Model, loops: Sequence[LoopClosure], bodies: dict[int, Any]) -> None:
+    """Close a robot's chains, given the MuJoCo bodies by Pinocchio's joint id.
+
+    Raises:
+        UnknownName: the robot lacks a loop's frame.
+    """
+    if not loops:
+        return
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    for index, loop in enumerate(loops):
+        sites = [
+            _site(model, name, bodies, f"loop_{index}_{side}")
+            for side, name in zip("ab", (loop.frame_a, loop.frame_b), strict=True)
+        ]
+        equality = spec.add_equality(
+            name=f"loop_{index}", type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_SITE,
+            name1=sites[0], name2=sites[1],
+        )  # fmt: skip
+        _stiffen(spec, equality)
+
+
+def couple_followers(spec: mujoco.MjSpec, robot: RobotModel) -> None:
+    """Let the joints of a machine follow others as its URDF says."""
+    for each in followers_of(robot):
+        spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
+        equality = spec.add_equality(
+            type=mujoco.mjtEq.mjEQ_JOINT, objtype=mujoco.mjtObj.mjOBJ_JOINT, name1=robot.model.names[each.joint],
+            name2=robot.model.names[each.leader], data=[each.offset, each.ratio, *[0.0] * (mujoco.mjNEQDATA - 2)],
+        )  # fmt: skip
+        _stiffen(spec, equality)
+
+
+def _stiffen(spec: mujoco.MjSpec, equality: Any) -> None:
+    equality.solref = [2.2 * spec.option.timestep, 1.0]  # time steps; MuJoCo's minimum is 2
+    equality.solimp = (0.9999, 0.9999, 0.001, 0.5, 2.0)
+
+
+def _site(model: pin.Model, name: str, bodies: dict[int, Any], site: str) -> str:
+    if not model.existFrame(name):
+        raise UnknownName("frame", name, [f.name for f in model.frames], "named in [[loop]]")
+    frame = model.frames[model.getFrameId(name)]
+    bodies[frame.parentJoint].add_site(name=site, pos=frame.placement.translation)
+    return site

@@ -1,8 +1,7 @@
-"""Where an arm's things lie in a compiled model, and its Jacobian from what MuJoCo has already computed.
+"""Addresses of an arm in a compiled model, and its Jacobian from MuJoCo's quantities.
 
-For a hinge with axis a through the point c the column of a point p is [a x (p - c); a], for a slide [a; 0], for a free
-base [1, -[r]x R; 0, R], whose linear velocity is in base axes and angular velocity in its own. It equals Pinocchio's
-(tested to 1e-10).
+For a point p, the column of a hinge with axis a through c is [a x (p - c); a], of a slide [a; 0], of a free base [1,
+-[r]x R; 0, R] (linear velocity in base axes, angular in body axes).
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from skillframe.world.convert import BASE, FIXTURE, MOUNT, SECOND, SENSOR, SPRUN
 
 
 class Layout:
-    """Where an arm's things lie in the compiled model: body ids, joint addresses, the order of coordinates."""
+    """Body ids, joint addresses and coordinate orders of an arm in a compiled model."""
 
     def __init__(self, model: mujoco.MjModel, sensor: str = SENSOR, tool: str = TOOL) -> None:
         self.model = model
@@ -27,8 +26,8 @@ class Layout:
         self.root = int(model.body_rootid[self.tool])
         first = int(model.sensor(f"{sensor}_force").adr[0])
         self.readings = slice(first, first + 6)
-        fixed = {0} | {b for b in range(model.nbody) if _no_link(model.body(b).name)}
-        self.links = np.array([b for b in range(model.nbody) if b not in fixed])
+        names, others = [model.body(b).name for b in range(model.nbody)], (BASE, FIXTURE, TOOL, SENSOR, SECOND)
+        self.links = np.array([b for b, n in enumerate(names) if b and n not in others and not n.startswith(SPRUNG)])
         self.free = bool(model.njnt and model.jnt_type[0] == mujoco.mjtJoint.mjJNT_FREE)
         named = [model.joint(j).name.startswith(SPRUNG) for j in range(model.njnt)]
         self.sprung = np.flatnonzero(np.array(named, dtype=bool)[model.dof_jntid])
@@ -36,13 +35,11 @@ class Layout:
         self.balls = model.jnt_qposadr[balls].astype(np.int64)
         mount = [j for j in range(model.njnt) if model.joint(j).name.startswith(MOUNT)]
         self.mount, self.mount_places = (part[mount].astype(np.int64) for part in (model.jnt_dofadr, model.jnt_qposadr))
-        self.places = _places(model)
-        self._set_chain(model)
-        self._rows, self._columns = _sparse_indices(model)
-        self._ordered: tuple[Any, list[tuple[int, int, int]]] = (None, [])
-        """A model of Pinocchio, and of each of its joints size, place in its configuration, and place in MuJoCo's."""
-
-    def _set_chain(self, model: mujoco.MjModel) -> None:
+        joints = model.dof_jntid
+        single = (model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_HINGE) | (
+            model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_SLIDE
+        )
+        self.places = np.where(single, model.jnt_qposadr[joints], 0).astype(np.int64)
         ancestors, body = set(), self.sensor
         while body:
             ancestors.add(body)
@@ -55,9 +52,22 @@ class Layout:
         self.hinges, self.hinge_dofs = _span(hinges), _span(model.jnt_dofadr[hinges])
         self.slides, self.slide_dofs = _span(slides), _span(model.jnt_dofadr[slides])
         self.dofs = np.sort(model.jnt_dofadr[np.concatenate([hinges, slides])]).astype(np.int64)
+        rows = np.repeat(np.arange(model.nv), model.M_rownnz)
+        columns = np.concatenate(
+            [model.M_colind[a : a + n] for a, n in zip(model.M_rowadr, model.M_rownnz, strict=True)]
+            or [np.zeros(0, int)]
+        )
+        self._rows, self._columns = rows.astype(np.int64), columns.astype(np.int64)
+        self._ordered: tuple[Any, list[tuple[int, int, int]]] = (None, [])
+        """Cached Pinocchio model and, of each joint, size and both addresses."""
+
+    def body_of(self, geom: int) -> str:
+        """Readable name of a geom's body: "the tool", "the fixture", "the part 'lid'"."""
+        name = self.model.body(int(self.model.geom_bodyid[geom])).name
+        return f"the part {name.removeprefix(SPRUNG)!r}" if name.startswith(SPRUNG) else f"the {name}"
 
     def friction_share(self, robot: RobotModel) -> Float:
-        """(nv,) part of the drawn joint friction that each generalised velocity gets."""
+        """(nv,) share of the sampled joint friction."""
         share = np.ones(self.model.nv)
         share[self.sprung] = 0.0
         for name, part in robot.spec.friction_share.items():
@@ -65,7 +75,7 @@ class Layout:
         return share
 
     def jacobian(self, anchor: Float, axis: Float, xmat: Float, point: Float) -> Float:
-        """(N, 6, nv): for a hinge [a x (p - anchor); a], for a slide [a; 0], for a free base [1, -[r]x R. 0, R]."""
+        """(N, 6, nv) Jacobian at a point (N, 3), by the formula of the module."""
         jacobian = np.zeros((len(point), 6, self.model.nv))
         if self.turns:
             a = axis[:, self.hinges]
@@ -84,7 +94,7 @@ class Layout:
         return jacobian
 
     def dense(self, sparse: Float) -> Float:
-        """Symmetric matrices (N, nv, nv) from MuJoCo's row-compressed lower triangles."""
+        """Symmetric matrices (N, nv, nv) from MuJoCo's sparse lower triangles."""
         nv = self.model.nv
         result = np.zeros((len(sparse), nv, nv))
         result[:, self._rows, self._columns] = sparse
@@ -92,7 +102,6 @@ class Layout:
         return result
 
     def _order(self, model: Any) -> list[tuple[int, int, int]]:
-        """Of every joint its size and its place in Pinocchio's and in MuJoCo's configuration, found once."""
         if self._ordered[0] is not model:
             joints = [(model.joints[i], model.names[i]) for i in range(1, model.njoints)]
             places = [(j.nq, j.idx_q, int(self.model.joint(name).qposadr[0])) for j, name in joints]
@@ -102,7 +111,7 @@ class Layout:
         return self._ordered[1]
 
     def to_mujoco(self, model: Any, configuration: Float) -> Float:
-        """Pinocchio's configuration (N, nq) in MuJoCo's order: quaternions w first, continuous joints as angles."""
+        """Convert a Pinocchio configuration (N, nq): quaternions w first, continuous joints as angles."""
         qpos = np.zeros((len(configuration), self.model.nq))
         for size, start, address in self._order(model):
             if size == 7:
@@ -128,28 +137,6 @@ class Layout:
         return configuration
 
 
-def _places(model: mujoco.MjModel) -> NDArray[np.int64]:
-    """(nv,) where in the configuration the position of each generalised velocity's joint stands."""
-    joints = model.dof_jntid
-    single = (model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_HINGE) | (
-        model.jnt_type[joints] == mujoco.mjtJoint.mjJNT_SLIDE
-    )
-    return np.where(single, model.jnt_qposadr[joints], 0).astype(np.int64)
-
-
-def _no_link(name: str) -> bool:
-    return name in (BASE, FIXTURE, TOOL, SENSOR, SECOND) or name.startswith(SPRUNG)
-
-
 def _span(indices: NDArray[np.int64]) -> slice | NDArray[np.int64]:
-    """Indices as a slice where they follow each other: a view, where an array of indices would copy."""
     first, count = (int(indices[0]) if len(indices) else 0), len(indices)
     return slice(first, first + count) if np.array_equal(indices, np.arange(first, first + count)) else indices
-
-
-def _sparse_indices(model: mujoco.MjModel) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    rows = np.repeat(np.arange(model.nv), model.M_rownnz)
-    columns = np.concatenate(
-        [model.M_colind[a : a + n] for a, n in zip(model.M_rowadr, model.M_rownnz, strict=True)] or [np.zeros(0, int)]
-    )
-    return rows.astype(np.int64), columns.astype(np.int64)

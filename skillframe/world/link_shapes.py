@@ -1,15 +1,15 @@
-"""Shapes of a robot's links, to tell whether one of them stands in the fixture.
+"""Geoms of a robot's links: to draw them, and to check collisions.
 
-Of each link its `<collision>` shapes count, where one of them can be read, else its `<visual>` shapes. A body that has
-neither (meshes that are not there, or of a kind that is not read) counts as a capsule from its joint to the next, as it
-is drawn. Links at and beyond an arm's tool frame, and a payload, are the tool: they are meant to touch. Our choice.
+Drawn are primitive visuals, or capsules between joints instead of meshes. For collisions, a link has its readable
+`<collision>` shapes, else its `<visual>` shapes, else a capsule to the next joint.
 """
 
 from __future__ import annotations
 
+import hashlib
 import math
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterator
+from collections.abc import Container, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -18,31 +18,123 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from skillframe.frames import Float, Pose, cross, norm
+from skillframe.frames import Float, Pose, cross, norm, quaternion_from_matrix
 from skillframe.robot.bodies import mesh_scale
 from skillframe.robot.bodies import placement as origin_of
-from skillframe.robot.convexity import hull_of, is_convex, open_edges
-from skillframe.robot.meshes import LARGEST_FILE, mesh_triangles, resolve_mesh
+from skillframe.robot.meshes import (
+    FINE,
+    LARGEST_FILE,
+    MOST,
+    hull_of,
+    is_convex,
+    mesh_triangles,
+    missing_collada,
+    open_edges,
+    resolve_mesh,
+    thinned,
+)
 from skillframe.robot.model import RobotModel
-from skillframe.robot.thinning import FINE, MOST, thinned
 from skillframe.world.scene import Geom
-from skillframe.world.visuals import bones, placed_geom
 
-SPACING, MOST_PIECES = 0.005, 200
-"""Distance of points on a link's mesh [m], and parts of an edge at most."""
-SMALLEST_VOLUME = 1e-12  # m3; of a cube of 0.1 mm
-MANY = 20_000
-"""Triangles beyond which a mesh is thinned out."""
+LINK_COLOUR = (0.86, 0.87, 0.89, 1.0)
+
+
+def link_geoms(robot: RobotModel) -> dict[str, tuple[Geom, ...]]:
+    """Geoms by joint name, in the frame of the joint's body."""
+    model = robot.model
+    found: dict[str, list[Geom]] = {name: [] for name in model.names}
+    root = ET.parse(robot.spec.urdf).getroot()
+    materials = {material.get("name", ""): material for material in root.findall("material")}
+    for link in root.findall("link"):
+        name = link.get("name", "")
+        if not model.existBodyName(name):
+            continue
+        frame = model.frames[model.getBodyId(name)]
+        for visual in link.findall("visual"):
+            geom = placed_geom(visual, frame.placement, materials)
+            if geom is not None:
+                found[model.names[frame.parentJoint]].append(geom)
+    for name, bone in bones(model, {name for name, geoms in found.items() if geoms}):
+        found[name].append(bone)
+    return {name: tuple(geoms) for name, geoms in found.items()}
+
+
+def bones(model: pin.Model, shaped: Container[str]) -> Iterator[tuple[str, Geom]]:
+    """Capsules to the next joint for bodies without shape, by joint name."""
+    boned: set[str] = set()
+    for joint in range(2, model.njoints):
+        parent = model.names[model.parents[joint]]
+        reach = np.array(model.jointPlacements[joint].translation)
+        if parent not in shaped and parent not in boned and norm(reach) > 0.02:
+            boned.add(parent)
+            rotation = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), reach / norm(reach)).matrix()
+            x, y, z, w = (float(v) for v in quaternion_from_matrix(rotation))
+            middle, length = 0.5 * reach, float(norm(reach))
+            yield parent, Geom(
+                kind="capsule", size=(0.1 * length, 0.5 * length), position=(middle[0], middle[1], middle[2]),
+                quaternion=(x, y, z, w), rgba=LINK_COLOUR, collide=False,
+            )  # fmt: skip
+
+
+def placed_geom(visual: ET.Element, placement: pin.SE3, materials: Mapping[str, ET.Element]) -> Geom | None:
+    """Primitive of a `<visual>` or `<collision>` in its body's frame, or None."""
+    shape = visual.find("geometry")
+    child = None if shape is None else next(iter(shape), None)
+    if child is None:
+        return None
+    origin = visual.find("origin")
+    at = placement * _origin(origin)
+    size: tuple[float, ...]
+    if child.tag == "box":
+        kind, size = "box", tuple(0.5 * float(v) for v in child.get("size", "0 0 0").split())
+    elif child.tag == "sphere":
+        kind, size = "sphere", (float(child.get("radius", 0)),)
+    elif child.tag in ("cylinder", "capsule"):
+        kind, size = child.tag, (float(child.get("radius", 0)), 0.5 * float(child.get("length", 0)))
+    else:
+        return None
+    x, y, z, w = (float(v) for v in quaternion_from_matrix(at.rotation))
+    px, py, pz = (float(v) for v in at.translation)
+    return Geom(
+        kind=kind,
+        size=size,
+        position=(px, py, pz),
+        quaternion=(x, y, z, w),
+        rgba=_colour(visual, materials),
+        collide=False,
+    )
+
+
+def _origin(origin: ET.Element | None) -> pin.SE3:
+    if origin is None:
+        return pin.SE3.Identity()
+    xyz = np.array([float(v) for v in origin.get("xyz", "0 0 0").split()])
+    roll, pitch, yaw = (float(v) for v in origin.get("rpy", "0 0 0").split())
+    return pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), xyz)
+
+
+def _colour(visual: ET.Element, materials: Mapping[str, ET.Element]) -> tuple[float, float, float, float]:
+    material = visual.find("material")
+    colour = None if material is None else material.find("color")
+    if colour is None and material is not None and material.get("name", "") in materials:
+        colour = materials[material.get("name", "")].find("color")
+    if colour is None:
+        return LINK_COLOUR
+    r, g, b, a = (float(v) for v in colour.get("rgba", "0.8 0.8 0.8 1").split())
+    return (r, g, b, a)
+
+
+UNREAD = "unread_mesh"
 
 
 class LinkShape(NamedTuple):
-    """A shape of a link: convex, in the frame of the body that a joint moves.
+    """A convex shape of a link, in its joint's body frame.
 
     Attributes:
-        link: name of the URDF's link; body: name of the joint that moves it, "universe" for what stands still.
-        surface: (P, 3) points of the surface where the geom is only the hull of a mesh that is not convex; else None.
-        tool: it is at or beyond a tool frame, or carried.
-        guessed: nothing of the body is drawn; the shape is a capsule from its joint to the next.
+        link: name in the URDF; body: name of its joint, "universe" if fixed.
+        surface: (P, 3) surface points if not convex.
+        tool: at or beyond a tool frame, or carried.
+        guessed: a capsule for an undrawn body.
     """
 
     link: str
@@ -54,7 +146,7 @@ class LinkShape(NamedTuple):
 
 
 def link_shapes(robot: RobotModel) -> list[LinkShape]:
-    """Shapes of every link, in the order of the URDF, then those that are guessed."""
+    """Shapes of every link in the URDF's order, then guessed ones."""
     tool = tool_links(robot)
     found: list[LinkShape] = []
     for name, link in robot.urdf.links.items():
@@ -69,7 +161,7 @@ def link_shapes(robot: RobotModel) -> list[LinkShape]:
 
 
 def tool_links(robot: RobotModel) -> set[str]:
-    """Links at and beyond the tool frames, and what is carried."""
+    """Links at and beyond the tool frames, and the payload."""
     children = robot.urdf.children()
     layer = [arm.tool_frame for arm in robot.spec.arm]
     layer += [] if robot.spec.payload is None else [robot.spec.payload.link]
@@ -91,22 +183,23 @@ def _shapes_of(robot: RobotModel, name: str, link: ET.Element, frame: pin.Frame)
 
 
 def _shape(robot: RobotModel, element: ET.Element, placement: pin.SE3) -> tuple[Geom, Float | None] | None:
-    """A shape as a convex geom and, if it is not convex, points of its surface, or None where it cannot be read."""
     mesh = element.find("geometry/mesh")
     if mesh is None:
         geom = placed_geom(element, placement, {})
         return None if geom is None or min(geom.size) <= 0.0 else (geom, None)
     file = resolve_mesh(mesh.get("filename", ""), robot.urdf.path)
     read = None if file is None else read_mesh(file)
-    if read is None:
+    known = None if read is None else _known(read, mesh_scale(mesh))
+    if known is None:
         return None
     at = Pose(np.array(placement.translation), np.array(placement.rotation)).compose(origin_of(element))
-    placed = np.ascontiguousarray((read.corners * mesh_scale(mesh)) @ at.rotation.T + at.position)
-    return _cloud(placed.tobytes()) if read.thinned else _mesh(placed.tobytes())
+    vertices = known.vertices @ at.rotation.T + at.position
+    geom = Geom(kind="mesh", vertices=vertices, faces=known.faces)
+    return geom, None if known.surface is None else known.surface @ at.rotation.T + at.position
 
 
 class ReadMesh(NamedTuple):
-    """A mesh of a file: corners of its triangles (T, 3, 3), or of very many some points (P, 3), and how many it has."""
+    """Triangle corners (T, 3, 3), or points (P, 3) if thinned, and the number of triangles."""
 
     corners: Float
     triangles: int
@@ -114,7 +207,7 @@ class ReadMesh(NamedTuple):
 
 
 def read_mesh(file: Path) -> ReadMesh | None:
-    """The mesh of a file, or None where it cannot be read."""
+    """Mesh of a file, or None if it cannot be read."""
     try:
         about = file.stat()
     except OSError:
@@ -127,38 +220,50 @@ def _read(file: Path, changed: int, size: int) -> ReadMesh | None:
     corners = mesh_triangles(file)
     if corners is None:
         return None
-    many = len(corners) > MANY
+    many = len(corners) > 20_000  # triangles
     return ReadMesh(thinned(corners.reshape(-1, 3)) if many else corners, len(corners), many)
 
 
-@lru_cache(maxsize=64)  # a campaign asks for the same links in every chunk
-def _mesh(content: bytes) -> tuple[Geom, Float | None] | None:
-    """The hull of triangles (T, 3, 3), and points of the surface if that fills something, or None if it is flat."""
-    triangles = np.frombuffer(content).reshape(-1, 3, 3)
-    corners = triangles.reshape(-1, 3)
-    return _hulled(corners, np.arange(len(corners)).reshape(-1, 3), lambda: points_on(triangles))
+class KnownMesh(NamedTuple):
+    """Collision hull of a scaled mesh, and surface points (P, 3) if not convex."""
+
+    vertices: Float
+    faces: NDArray[np.int64]
+    surface: Float | None
 
 
-@lru_cache(maxsize=64)
-def _cloud(content: bytes) -> tuple[Geom, Float | None] | None:
-    """The same of some points (P, 3) of a mesh."""
-    points = np.frombuffer(content).reshape(-1, 3)
-    return _hulled(points, np.repeat(np.arange(len(points)), 3).reshape(-1, 3), lambda: points)
+_KNOWN: dict[bytes, KnownMesh | None] = {}
+"""Cache by content."""
 
 
-def _hulled(corners: Float, faces: NDArray[np.int64], surface: Callable[[], Float]) -> tuple[Geom, Float | None] | None:
+def _known(read: ReadMesh, scale: Float) -> KnownMesh | None:
+    corners = np.ascontiguousarray(read.corners * scale).reshape(-1, 3)
+    key = hashlib.blake2b(corners.tobytes(), digest_size=16).digest()
+    if key not in _KNOWN:
+        _KNOWN[key] = _looked_at(corners, read.thinned)
+    return _KNOWN[key]
+
+
+def _looked_at(corners: Float, few: bool) -> KnownMesh | None:
+    faces = np.repeat(np.arange(len(corners)), 3) if few else np.arange(len(corners))
     hull = hull_of(corners)
-    if hull is None or hull.volume < SMALLEST_VOLUME:
+    if hull is None or hull.volume < 1e-12:  # m3, a cube of 0.1 mm
         return None
-    geom = Geom(kind="mesh", vertices=hull.vertices, faces=hull.faces)
-    if is_convex(corners, faces, hull):
-        return geom, None
-    points = surface()
-    return geom, thinned(points) if len(points) > 2 * MOST else points
+    if is_convex(corners, faces.reshape(-1, 3), hull):
+        return KnownMesh(hull.vertices, hull.faces, None)
+    points = corners if few else points_on(corners.reshape(-1, 3, 3))
+    return KnownMesh(hull.vertices, hull.faces, thinned(points) if len(points) > 2 * MOST else points)
+
+
+@lru_cache(maxsize=1024)
+def _edges(file: Path, changed: int, size: int) -> int:
+    read = _read(file, changed, size)
+    assert read is not None
+    return open_edges(read.corners.reshape(-1, 3), np.arange(3 * len(read.corners)).reshape(-1, 3))
 
 
 class OddMesh(NamedTuple):
-    """A mesh that collisions know otherwise than it is drawn: whose, a fixed word, what is wrong, and the cure."""
+    """A mesh that collides differently than drawn."""
 
     link: str
     code: str
@@ -167,7 +272,22 @@ class OddMesh(NamedTuple):
 
 
 def odd_meshes(robot: RobotModel) -> Iterator[OddMesh]:
-    """Meshes of links that are there and that collisions do not take as they are."""
+    """Meshes of links that collide differently than drawn, unreadable ones as one entry."""
+    odd = list(_odd_ones(robot))
+    unread = [each for each in odd if each.code == UNREAD]
+    yield from (each for each in odd if each.code != UNREAD)
+    if not unread:
+        return
+    names = list(dict.fromkeys(each.message for each in unread))
+    named = ", ".join(map(repr, names[:3])) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+    what = f"mesh{'es' * (len(names) > 1)} {named} cannot be read as STL, OBJ or COLLADA, or more than "
+    what += f"{LARGEST_FILE // 10**6} MB: collisions take what else is drawn, or a capsule from joint to joint"
+    lacks = missing_collada() and any(name.lower().endswith(".dae") for name in names)
+    fix = "pip install 'skillframe[collada]', or " if lacks else ""
+    yield OddMesh(unread[0].link, UNREAD, what, fix + unread[0].fix)
+
+
+def _odd_ones(robot: RobotModel) -> Iterator[OddMesh]:
     for name, link in robot.urdf.links.items():
         if not robot.model.existBodyName(name):
             continue
@@ -183,29 +303,28 @@ def odd_meshes(robot: RobotModel) -> Iterator[OddMesh]:
 def _odd(robot: RobotModel, link: str, element: ET.Element, shaped: bool) -> Iterator[OddMesh]:
     mesh = element.find("geometry/mesh")
     file = None if mesh is None else resolve_mesh(mesh.get("filename", ""), robot.urdf.path)
-    if file is None:  # a mesh that is not there is named by the audit
+    if file is None:
         return
     read, fix = read_mesh(file), "give the link a <collision> of boxes, cylinders or spheres, or of a coarse mesh"
     if read is None:
-        text = f"mesh {file.name!r} cannot be read as STL or OBJ, or is larger than {LARGEST_FILE // 10**6} MB: "
-        yield OddMesh(link, "unread_mesh", text + "collisions take what else is drawn, or a capsule", fix)
+        yield OddMesh(link, UNREAD, file.name, fix)
     elif not shaped:
         yield OddMesh(link, "flat_mesh", f"mesh {file.name!r} has no volume: collisions do not know it", fix)
     elif read.thinned:
         text = f"mesh {file.name!r} has {read.triangles} triangles: collisions take some thousand of its corners, "
         yield OddMesh(link, "large_mesh", text + f"right to about 1/{FINE} of its size", fix)
-    elif count := open_edges(read.corners.reshape(-1, 3), np.arange(3 * len(read.corners)).reshape(-1, 3)):
+    elif count := _edges(file, file.stat().st_mtime_ns, file.stat().st_size):
         text = f"mesh {file.name!r} is not closed ({count} open edges): collisions know its surface, not its inside"
         yield OddMesh(link, "open_mesh", text, fix)
 
 
 def points_on(triangles: Float) -> Float:
-    """Points (P, 3) on triangles (T, 3, 3): their corners, and between them so many that `SPACING` is kept."""
+    """Points (P, 3) on triangles (T, 3, 3): corners and others every 5 mm."""
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
     area = 0.5 * float(np.sum(norm(cross(b - a, c - a))))
-    spacing = max(SPACING, math.sqrt(area / MOST))
+    spacing = max(0.005, math.sqrt(area / MOST))  # m between surface points, at most 200 parts of an edge
     longest = np.maximum(np.maximum(norm(b - a), norm(c - b)), norm(a - c))
-    pieces = np.ceil(longest / spacing).astype(int).clip(1, MOST_PIECES)
+    pieces = np.ceil(longest / spacing).astype(int).clip(1, 200)
     found = [triangles.reshape(-1, 3)]
     for n in np.unique(pieces[pieces > 1]):
         chosen = pieces == n

@@ -1,13 +1,11 @@
-"""What may touch what: the bodies that are compared with each other, and those that are not.
+"""Parts of robot and scene, and the pairs that are checked for collisions.
 
 | | link | fixture | obstacle | tool |
 |---|---|---|---|---|
-| link | looked at | looked at | looked at | looked at |
-| tool | | meant to touch | looked at | not looked at |
-
-Of two links those are left out that one joint parts, that belong to one closed loop, or that touch at home and have at
-most one body between them: drawn shapes overlap at joints. What an arm holds is not compared with the arm's last two
-links. A link without any shape counts as none. The rules are ours.
+| link | checked | checked | checked | checked |
+| tool | | may touch | checked | exempt |
+Links are exempt if one joint separates them, if they share a closed loop, or if they touch at home with at most one
+body between them. What an arm holds is exempt from its last two links.
 """
 
 from __future__ import annotations
@@ -18,29 +16,28 @@ from typing import NamedTuple
 
 from skillframe.frames import Float
 from skillframe.robot.model import RobotModel
-from skillframe.robot.surroundings import FIXTURE as FIXTURE_KEY
-from skillframe.robot.surroundings import TOOL as TOOL_KEY
+from skillframe.robot.tables import FIXTURE as FIXTURE_KEY
+from skillframe.robot.tables import TOOL as TOOL_KEY
 from skillframe.world.convert import FIXTURE, SPRUNG, TOOL, held
 from skillframe.world.link_shapes import link_shapes
 from skillframe.world.scene import Geom, Scene
 
 WORLD = "universe"
 LINK, BASE_LINK, HAND, HELD, STANDING, OBSTACLE = "link", "base link", "hand", "held", "standing", "obstacle"
-"""Roles: links that move and links that do not, what an arm holds, a fixture that stands, what stands around."""
+"""Roles: moving and fixed links, what an arm holds, a standing fixture, obstacles."""
 NEIGHBOURS, LOOP, HOLDS, HOME, IGNORED = "neighbours", "one loop", "holds it", "touch at home", "ignored"
-"""Why a pair is not looked at."""
+"""Reasons for exempt pairs."""
 Pair = tuple[int, int]
 
 
 class Solid(NamedTuple):
-    """Shapes that move as one and have one name.
+    """Shapes that move together under one name.
 
     Attributes:
-        name: for people; key: as `[collisions] ignore` says it.
-        body: of the plant, that carries it; joint: the joint of the Pinocchio model that moves it, 0 for what stands.
-        role: decides with which others it is compared.
-        shapes: each with points (P, 3) of its surface, or None where it is convex.
-        guessed: its shapes are.
+        name: for messages; key: in `[collisions] ignore`.
+        body: of the plant; joint: index in Pinocchio, 0 if fixed.
+        role: selects the parts to check against.
+        shapes: with surface points (P, 3) if not convex.
     """
 
     name: str
@@ -53,7 +50,7 @@ class Solid(NamedTuple):
 
 
 def robot_parts(robot: RobotModel) -> list[Solid]:
-    """Its links that have a shape, and the obstacles of its robot.toml."""
+    """Links with a shape, and obstacles of robot.toml."""
     found: dict[str, Solid] = {}
     for shape in link_shapes(robot):
         joint = 0 if shape.body == WORLD else int(robot.model.getJointId(shape.body))
@@ -61,27 +58,24 @@ def robot_parts(robot: RobotModel) -> list[Solid]:
         empty = Solid(f"link {shape.link!r}", shape.link, shape.body, joint, role, (), shape.guessed)
         part = found.setdefault(shape.link, empty)
         found[shape.link] = part._replace(shapes=(*part.shapes, (shape.geom, shape.surface)))
-    return [*found.values(), *_obstacles(robot)]
-
-
-def obstacle_geoms(robot: RobotModel) -> dict[str, Geom]:
-    """The obstacles of robot.toml by name, in base."""
-    found = {}
-    for one in robot.spec.obstacle:
-        size = tuple(0.5 * edge for edge in one.size) if one.kind == "box" else (0.0, 0.0, 0.1)  # MuJoCo: no end
-        found[one.name] = Geom(kind=one.kind, size=size, position=one.position, quaternion=one.attitude)
-    return found
-
-
-def _obstacles(robot: RobotModel) -> list[Solid]:
+    obstacles = obstacle_geoms(robot).items()
     return [
-        Solid(f"the obstacle {name!r}", name, WORLD, 0, OBSTACLE, ((geom, None),))
-        for name, geom in obstacle_geoms(robot).items()
+        *found.values(),
+        *(Solid(f"the obstacle {name!r}", name, WORLD, 0, OBSTACLE, ((geom, None),)) for name, geom in obstacles),
     ]
 
 
+def obstacle_geoms(robot: RobotModel) -> dict[str, Geom]:
+    """Obstacles of robot.toml by name, in base."""
+    found = {}
+    for one in robot.spec.obstacle:
+        size = tuple(0.5 * edge for edge in one.size) if one.kind == "box" else (0.0, 0.0, 0.1)  # infinite in MuJoCo
+        found[one.name] = Geom(kind=one.kind, size=size, position=one.position, quaternion=one.orientation)
+    return found
+
+
 def scene_parts(robot: RobotModel, scene: Scene) -> list[Solid]:
-    """The fixture, each of its sprung parts, and the tool, as far as they collide."""
+    """Colliding parts of fixture and tool."""
     arms = [int(robot.model.frames[frame].parentJoint) for frame in robot.tool_frames]
     in_hand = held(robot, scene)
     groups = [(FIXTURE, scene.fixture), *((SPRUNG + part.name, part.geoms) for part in scene.sprung)]
@@ -96,45 +90,44 @@ def _colliding(geoms: Iterable[Geom]) -> tuple[tuple[Geom, None], ...]:
 
 
 def left_out(robot: RobotModel, parts: Sequence[Solid]) -> dict[Pair, str]:
-    """Pairs of parts that their place in the robot leaves out, each with the reason. First the smaller index."""
+    """Exempt pairs (smaller index first), with reasons."""
     tree = _Tree(robot, {part.joint for part in parts})
+    ignored = [{*pair} for pair in robot.spec.collisions.ignore]
     found: dict[Pair, str] = {}
     for (i, one), (k, two) in combinations(enumerate(parts), 2):
         if not compared(one.role, two.role):
             continue
-        if why := _ignored(robot, one, two) or tree.why(one, two):
+        if why := IGNORED if {one.key, two.key} in ignored else tree.why(one, two):
             found[i, k] = why
     return found
 
 
 def compared(one: str, two: str) -> bool:
-    """Are parts of these two roles compared with each other?"""
+    """Whether parts of two roles are checked."""
     bits, meets = zip(*(BITS[role] for role in (one, two)), strict=True)
     return bool(bits[0] & meets[1] or bits[1] & meets[0])
 
 
 def any_left(parts: Sequence[Solid], skipped: Container[Pair]) -> bool:
-    """Is there any pair of parts to look at?"""
+    """Whether any pair is checked."""
     pairs = combinations(range(len(parts)), 2)
     return any(compared(parts[i].role, parts[k].role) and (i, k) not in skipped for i, k in pairs)
 
 
 BITS = {LINK: (1, 3), BASE_LINK: (1, 1), HAND: (1, 2), HELD: (1, 2), STANDING: (1, 0), OBSTACLE: (2, 0)}
-"""MuJoCo's contype and conaffinity of a role: 1 is of what links meet, 2 of what stands around."""
-
-
-def _ignored(robot: RobotModel, one: Solid, two: Solid) -> str:
-    pairs = ({*pair} for pair in robot.spec.collisions.ignore)
-    return IGNORED if {one.key, two.key} in pairs else ""
+"""MuJoCo's contype and conaffinity by role."""
 
 
 class _Tree:
-    """Bodies that have a shape, and how many joints part them. Those without a shape are passed over."""
+    """Tree of the bodies that have a shape."""
 
     def __init__(self, robot: RobotModel, shaped: set[int]) -> None:
         self.parents, self.shaped = [int(joint) for joint in robot.model.parents], {0, *shaped}
         self.above = {joint.child: joint.parent for joint in robot.urdf.joints.values()}
-        ends = [[_joint_of(robot, name) for name in (loop.frame_a, loop.frame_b)] for loop in robot.spec.loop]
+        ends = [
+            [int(robot.model.frames[robot.model.getFrameId(name)].parentJoint) for name in (loop.frame_a, loop.frame_b)]
+            for loop in robot.spec.loop
+        ]
         self.loops = [self._between(*pair) for pair in ends]
 
     def _up(self, joint: int) -> list[int]:
@@ -144,23 +137,22 @@ class _Tree:
         return found
 
     def _between(self, one: int, two: int) -> set[int]:
-        """Joints of a loop: those on the way from the one end to the other, and the body that carries both."""
         first, second = self._up(one), self._up(two)
         shared = next(joint for joint in first if joint in second)
         return {*first[: first.index(shared)], *second[: second.index(shared)], shared}
 
     def carriers(self, joint: int) -> list[int]:
-        """A body and those that carry it, down to the base."""
+        """A body and its ancestors."""
         return [i for i in self._up(joint) if i in self.shaped]
 
     def apart(self, one: int, two: int) -> int:
-        """How many steps from a body to the next part two bodies."""
+        """Number of steps between two bodies."""
         first, second = self.carriers(one), self.carriers(two)
         shared = next(joint for joint in first if joint in second)
         return first.index(shared) + second.index(shared)
 
     def branches(self, one: Solid, two: Solid) -> int:
-        """1 for a link that moves and one that stands and does not carry it, as the other arm's base, else 0."""
+        """1 for a moving link and a fixed one that does not carry it, else 0."""
         if bool(one.joint) == bool(two.joint):
             return 0
         moves, stands = (one, two) if one.joint else (two, one)
@@ -170,7 +162,7 @@ class _Tree:
         return int(link != stands.key)
 
     def why(self, one: Solid, two: Solid) -> str:
-        """Why a pair is left out, or ""."""
+        """Reason why a pair is exempt, or ""."""
         if OBSTACLE in (one.role, two.role):
             return ""
         for part, other in ((one, two), (two, one)):
@@ -185,12 +177,8 @@ class _Tree:
 
 
 def near(robot: RobotModel, parts: Sequence[Solid], pair: Pair) -> bool:
-    """Is there at most one body between two links, so that their drawn shapes may overlap?"""
+    """Whether at most one body is between two links, so that their shapes may overlap."""
     one, two = (parts[i] for i in pair)
     links = all(part.role in (LINK, BASE_LINK, HAND) for part in (one, two))
     tree = _Tree(robot, {part.joint for part in parts})
     return links and tree.apart(one.joint, two.joint) + tree.branches(one, two) == 2
-
-
-def _joint_of(robot: RobotModel, frame: str) -> int:
-    return int(robot.model.frames[robot.model.getFrameId(frame)].parentJoint)

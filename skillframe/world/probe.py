@@ -1,8 +1,6 @@
-"""Which parts stand in each other? A MuJoCo model of their shapes alone, in which nothing moves or pushes.
+"""Overlaps of parts, from a MuJoCo model of their shapes alone.
 
-MuJoCo's own collision detection rules pairs out (boxes around bodies, spheres around shapes); of the pairs that are
-left `mj_geomDistance` gives the depth, the shortest way that parts two convex shapes. One posture is looked at at a
-time, from the poses of the bodies alone, so that its answer depends on nothing else. The plant is not touched.
+Results depend on one posture only: `mj_geomDistance` gives the depth of pairs left by the broad phase.
 """
 
 from __future__ import annotations
@@ -21,48 +19,51 @@ from skillframe.world.convert import add_geom
 from skillframe.world.parts import BITS, OBSTACLE, STANDING, Pair, Solid, compared
 
 TOLERANCE = 1e-3
-"""Depth that is let pass [m]; ours: the resolution of drawn primitives."""
+"""Allowed depth [m], the accuracy of drawn primitives."""
 FAR = 1.0
-"""[m] beyond which a distance is not worked out (ours)."""
+"""Largest distance measured [m]."""
 _POINT = "point"
-_ARENA = 4 * 1024 * 1024  # bytes; room for some thousand contacts
 
 
 Posture = tuple[Float, Float, Float]
-"""Where parts are: (7 F,) position and quaternion of those that move, (P, 3) and (P, 4) of those placed by trial."""
+"""(7 F,) positions and quaternions of moving parts, (P, 3) and (P, 4) of parts placed by trial."""
 
 
 class Overlap(NamedTuple):
-    """Two parts in each other, by index, and how deep [m]."""
+    """Indices of two overlapping parts, and depth [m]."""
 
     pair: Pair
     depth: float
 
 
 class Probe:
-    """Looks for parts that stand in each other.
-
-    Args:
-        parts: all of them.
-        skip: pairs that are not looked at, first the smaller index.
+    """Overlaps and distances of parts, but for pairs in `skip` (smaller index first).
 
     Raises:
         InputError: MuJoCo refuses a shape.
 
     Attributes:
-        free: indices of the parts that move, in the order of the rows that `overlaps` takes.
-        posed: indices of those that stand where each trial puts them.
-        reach: (F + P,) of these, how far their shapes reach from their origins at most [m].
-        bounded: whether `distance` knows all shapes, and those of `reach` end somewhere.
+        free: indices of moving parts, in the order of postures.
+        posed: indices of parts placed by each trial.
+        reach: (F + P,) their largest distance from the origin [m].
+        bounded: all shapes are convex and finite.
     """
 
     def __init__(self, parts: Sequence[Solid], skip: Collection[Pair]) -> None:
         self.free = [i for i, part in enumerate(parts) if part.role not in (OBSTACLE, STANDING)]
         self.posed = [i for i, part in enumerate(parts) if part.role == STANDING]
         spec = mujoco.MjSpec()
-        spec.memory = _ARENA
+        spec.memory = 4 * 1024 * 1024  # bytes
         for index in (*self.free, *self.posed, *(i for i, p in enumerate(parts) if p.role == OBSTACLE)):
-            self._add(spec, parts[index], index)
+            part = parts[index]
+            body = spec.worldbody.add_body(name=_body(index), mocap=part.role == STANDING)
+            if part.role not in (OBSTACLE, STANDING):
+                body.add_joint(name=_body(index), type=mujoco.mjtJoint.mjJNT_FREE)
+                body.mass, body.inertia, body.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
+            bits, meets = BITS[part.role]
+            for k, (geom, _) in enumerate(part.shapes):
+                solid = replace(geom, collide=True)
+                add_geom(spec, body, solid, f"{_body(index)}_{k}", contype=bits, conaffinity=meets, friction=0.0)
         for one, two in skip:
             spec.add_exclude(bodyname1=_body(one), bodyname2=_body(two))
         point = spec.worldbody.add_geom(name=_POINT, type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[1e-9, 0, 0])
@@ -75,7 +76,16 @@ class Probe:
             raise InputError("the shapes of the robot's links", text, fix) from None
         self._data = mujoco.MjData(self._model)
         self._point = int(self._model.geom(_POINT).id)
-        self._index(parts)
+        self._part = np.full(self._model.ngeom, -1)
+        self._surface: dict[int, Float] = {}
+        for i, part in enumerate(parts):
+            for k, (_, surface) in enumerate(part.shapes):
+                at = int(self._model.geom(f"{_body(i)}_{k}").id)
+                self._part[at] = i
+                if surface is not None:
+                    turn = np.zeros(9)
+                    mujoco.mju_quat2Mat(turn, self._model.geom_quat[at])
+                    self._surface[at] = np.asarray((surface - self._model.geom_pos[at]) @ turn.reshape(3, 3))
         self._pairs = np.array([*self._convex_pairs(parts, skip)], dtype=np.int64).reshape(-1, 2)
         planes = self._model.geom_type[self._pairs] == mujoco.mjtGeom.mjGEOM_PLANE
         self._reach = np.where(planes.any(axis=1), np.inf, self._model.geom_rbound[self._pairs].sum(axis=1))
@@ -83,58 +93,23 @@ class Probe:
         self.bounded = not self._surface and bool(np.isfinite(self.reach).all())
 
     def _furthest(self, index: int) -> float:
-        """How far a part's shapes reach from its origin at most [m], infinite if one is a plane."""
         geoms, model = np.flatnonzero(self._part == index), self._model
         far = np.sqrt(np.square(model.geom_pos[geoms]).sum(axis=-1)) + model.geom_rbound[geoms]
         plane = model.geom_type[geoms] == mujoco.mjtGeom.mjGEOM_PLANE
         return float(np.where(plane, np.inf, far).max(initial=0.0))
 
     def _convex_pairs(self, parts: Sequence[Solid], skip: Collection[Pair]) -> Iterator[tuple[int, int]]:
-        """Pairs of geoms that are looked at and both convex."""
         solid = [g for g in range(self._model.ngeom) if self._part[g] >= 0 and g not in self._surface]
         for one, two in combinations(solid, 2):
             i, k = sorted((int(self._part[one]), int(self._part[two])))
             if i != k and (i, k) not in skip and compared(parts[i].role, parts[k].role):
                 yield one, two
 
-    def _add(self, spec: mujoco.MjSpec, part: Solid, index: int) -> None:
-        body = spec.worldbody.add_body(name=_body(index), mocap=part.role == STANDING)
-        if part.role not in (OBSTACLE, STANDING):
-            body.add_joint(name=_body(index), type=mujoco.mjtJoint.mjJNT_FREE)
-            body.mass, body.inertia, body.explicitinertial = 1.0, [1.0, 1.0, 1.0], True
-        bits, meets = BITS[part.role]
-        for k, (geom, _) in enumerate(part.shapes):
-            solid = replace(geom, collide=True)  # links are drawn as shapes that push on nothing
-            add_geom(spec, body, solid, f"{_body(index)}_{k}", contype=bits, conaffinity=meets, friction=0.0)
-
-    def _index(self, parts: Sequence[Solid]) -> None:
-        """Of every geom the part that it is of, and points of its surface if only its hull is convex."""
-        self._part = np.full(self._model.ngeom, -1)
-        self._surface: dict[int, Float] = {}
-        for i, part in enumerate(parts):
-            for k, (_, surface) in enumerate(part.shapes):
-                geom = int(self._model.geom(f"{_body(i)}_{k}").id)
-                self._part[geom] = i
-                if surface is not None:
-                    self._surface[geom] = self._in_geom(geom, surface)
-
-    def _in_geom(self, geom: int, points: Float) -> Float:
-        """Points of a body's frame in the frame that MuJoCo gave a mesh."""
-        rotation = np.zeros(9)
-        mujoco.mju_quat2Mat(rotation, self._model.geom_quat[geom])
-        return np.asarray((points - self._model.geom_pos[geom]) @ rotation.reshape(3, 3))
-
-    def overlaps(self, free: Float, position: Float, quaternion: Float) -> list[Overlap]:
-        """Pairs that are deeper in each other than `TOLERANCE`, the deepest first.
-
-        Args:
-            free: (7 F,) position and quaternion (w, x, y, z) in base of every part that moves.
-            position: (P, 3) of those that each trial puts somewhere.
-            quaternion: (P, 4) of the same.
-        """
+    def overlaps(self, free: Float, position: Float, quaternion: Float, tolerance: float = TOLERANCE) -> list[Overlap]:
+        """Overlaps above a tolerance [m] in a posture, the deepest first."""
         self._pose(free, position, quaternion)
         mujoco.mj_collision(self._model, self._data)
-        return self._depths() if self._data.ncon else []
+        return self._depths(tolerance) if self._data.ncon else []
 
     def _pose(self, free: Float, position: Float, quaternion: Float) -> None:
         data = self._data
@@ -144,15 +119,9 @@ class Probe:
         mujoco.mj_kinematics(self._model, data)
 
     def distances(self, postures: Sequence[Posture], known: Float) -> Float:
-        """The smallest distance (N,) of two convex shapes that may not touch [m], or `known` where none is nearer.
+        """Smallest distance (N,) of convex shapes that may not touch [m], at most `known` (N,).
 
-        Negative is the depth of one in the other. Pairs are asked in the order of the distance that the spheres around
-        them leave at least, until that is no less than what was found. Meshes that are not convex are left out, since
-        their hulls are nearer than they are. Without any pair it is NaN.
-
-        Args:
-            postures: N of them, each as `overlaps` takes it.
-            known: (N,) [m].
+        Negative is a depth. Pairs are tested in the order of their bounding spheres' distance until none can be nearer.
         """
         if not len(self._pairs):
             return np.full(len(known), np.nan)
@@ -174,22 +143,17 @@ class Probe:
                 found[k] = min(found[k], mujoco.mj_geomDistance(self._model, data, one, two, max(found[k], 0.0), None))
         return np.array(found)
 
-    def _depths(self) -> list[Overlap]:
+    def _depths(self, tolerance: float) -> list[Overlap]:
         deepest: dict[Pair, float] = {}
         for one, two in np.unique(self._data.contact.geom, axis=0).tolist():
             i, k = sorted((int(self._part[one]), int(self._part[two])))
-            depth = self._depth(one, two)
-            if depth > max(TOLERANCE, deepest.get((i, k), 0.0)):
+            depth = -self._distance(one, two)
+            for geom, other in ((one, two), (two, one)):
+                if geom in self._surface and depth > tolerance:
+                    depth = min(depth, self._deepest_point(geom, other))
+            if depth > max(tolerance, deepest.get((i, k), 0.0)):
                 deepest[i, k] = depth
         return sorted((Overlap(*item) for item in deepest.items()), key=lambda found: -found.depth)
-
-    def _depth(self, one: int, two: int) -> float:
-        """Depth of two shapes in each other [m]. Of a mesh that is not convex, that of its deepest point."""
-        depth = -self._distance(one, two)
-        for geom, other in ((one, two), (two, one)):
-            if geom in self._surface and depth > TOLERANCE:
-                depth = min(depth, self._deepest_point(geom, other))
-        return depth
 
     def _deepest_point(self, geom: int, other: int) -> float:
         at, turn = self._frame(geom)
@@ -204,7 +168,6 @@ class Probe:
         return self._data.geom_xpos[geom], self._data.geom_xmat[geom].reshape(3, 3)
 
     def _inside_box(self, geom: int, points: Float) -> Float:
-        """(P,) which points lie in the box around a geom. All that is below a plane counts as inside."""
         at, turn = self._frame(geom)
         local = (points - at) @ turn
         if self._model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_PLANE:

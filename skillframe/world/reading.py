@@ -1,6 +1,6 @@
-"""Jacobian, wrist sensor and quaternions in C, to the last bit of the numpy that they stand for, in less of its time.
+"""Jacobian, wrist sensor and quaternions in C (reading.c), bit-identical to the NumPy code and faster.
 
-What is done is in reading.c. Without a compiler the code beside them runs.
+Without a compiler the NumPy code runs.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.fmu.native import Record, library
+from skillframe.fmu.build import Record, library
 from skillframe.frames import Float, Pose, quaternion_from_matrix, unit
 
 if TYPE_CHECKING:
@@ -22,14 +22,7 @@ SOURCE = Path(__file__).with_name("reading.c")
 
 
 class CompiledJacobian:
-    """Jacobians (N, 6, nv) of points of one arm's tool frame.
-
-    Args:
-        layout: of the arm.
-        anchor, axis: (N, joints, 3) of MuJoCo; matrix: (N, bodies, 9) of it; tool: its tool frame. All live, and they
-            stay where they are.
-        built: reading.c.
-    """
+    """Jacobians (N, 6, nv) of points of an arm's tool frame, from views of MuJoCo's arrays."""
 
     def __init__(
         self, layout: Layout, anchor: Float, axis: Float, matrix: Float, tool: Pose, built: ctypes.CDLL
@@ -54,7 +47,7 @@ class CompiledJacobian:
         self._jacobian = record.bound(built, "jacobian")
 
     def at(self, offset: Float) -> Float:
-        """Of the point `offset` (3,) or (N, 3) in tool axes, base axes, in an array of its own."""
+        """Jacobian of the point `offset` (3,) or (N, 3), in tool axes, as a new array in base axes."""
         np.matmul(self._rotation, offset[..., None], out=self._turned)
         self._jacobian()
         return self._out.copy()
@@ -64,9 +57,11 @@ class CompiledWrist:
     """Force-torque sensors of N trials.
 
     Args:
-        sensor: (N, 6) as the simulator has it, live.
-        noise: (B, N, 12) samples; bias: (N, 6). Both are written in place by who owns them.
-        weight: (3,) of the tool; center: (3,) of its mass.
+        sensor: (N, 6) of the simulator, a view.
+        noise: (B, N, 12) samples, which their owner writes.
+        bias: (N, 6), which its owner writes.
+        weight: (3,) of the tool.
+        center: (3,) of its mass.
         built: reading.c.
     """
 
@@ -83,7 +78,7 @@ class CompiledWrist:
         self._felt, self._weightless = record.bound(built, "felt", ctypes.c_int64), record.bound(built, "weightless")
 
     def wrench(self, sample: int, rotation: Float) -> Float:
-        """Wrench (N, 6) with the noise of a sample and without the tool's weight, by measured rotations (N, 3, 3)."""
+        """Wrench (N, 6) with a noise sample and without tool weight, for measured rotations (N, 3, 3)."""
         self._felt(sample)
         np.matmul(self._raw, rotation.mT, out=self._wrench)
         np.matmul(rotation, self._center, out=self._lever)
@@ -92,11 +87,7 @@ class CompiledWrist:
 
 
 class Quaternions:
-    """Unit quaternions of two times N rotations, as `skillframe.frames.quaternion_from_matrix`, in C if there is it.
-
-    Args:
-        count: N.
-    """
+    """Unit quaternions of twice `count` rotations, as `skillframe.frames.quaternion_from_matrix`, in C."""
 
     def __init__(self, count: int) -> None:
         self._rotation, self._row = np.zeros((2, count, 3, 3)), np.zeros((2, count, 4))
@@ -117,7 +108,7 @@ class Quaternions:
 def compiled_jacobian(
     layout: Layout, anchor: Float, axis: Float, matrix: Float, tool: Pose
 ) -> CompiledJacobian | None:  # fmt: skip
-    """A `CompiledJacobian`, or None without joints or without a compiler."""
+    """A `CompiledJacobian`, or None without joints or compiler."""
     built = library(SOURCE) if layout.model.njnt else None
     return None if built is None else CompiledJacobian(layout, anchor, axis, matrix, tool, built)
 

@@ -1,8 +1,7 @@
-"""A scene: fixtures, the tool in the robot's grip, where a run starts and when the task is done. It holds data only.
+"""Scenes: fixture, tool, start and goal of a task, as data.
 
-Frames: the *fixture frame* is where the task is described (its z axis points up, out of the hole or valley); the *tool
-frame* is the robot's `tool_frame` (flange, wrist), its z axis points out along the tool. A scene knows nothing of
-robots or engines; the plant compiles it, the teacher reads `Scene.task`, the learner sees neither.
+In the *fixture frame* z points up, out of the hole or valley; in the *tool frame*, the robot's `tool_frame`, out along
+the tool.
 """
 
 from __future__ import annotations
@@ -17,28 +16,27 @@ from numpy.typing import NDArray
 
 from skillframe.errors import InputError, UnknownName
 from skillframe.frames import Float, Pose
-from skillframe.robot.convexity import unfit_to_collide
+from skillframe.robot.meshes import unfit_to_collide
 from skillframe.world.surfaces import Surface
 
 Vector = tuple[float, float, float]
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
 KINDS = ("box", "capsule", "cylinder", "mesh", "plane", "sphere")
 REACTION_S = 0.2
-"""How long a person takes to see that something is done [s]; ours."""
+"""Reaction time of a teacher [s]."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Geom:
-    """A primitive or convex mesh, placed in its body's frame.
+    """A primitive or convex mesh in its body's frame.
 
     Attributes:
         kind: "box" (half sizes), "sphere" (radius), "capsule" and "cylinder" (radius, half length), "plane", "mesh".
-        size: in MuJoCo's meaning for the kind; empty for a mesh.
+        size: as in MuJoCo; empty for a mesh.
         position: (3,) [m]; quaternion: x, y, z, w.
-        vertices: (V, 3) of a convex mesh; faces: (F, 3) its triangles, closed; without them the hull is meant.
-        surface: of a mesh that collides as it is, convex or not, with others that have one, and with nothing else;
-            it lies in its body's frame, not turned or moved.
-        collide: takes part in contact; a geom that does not is there to be seen.
+        vertices: (V, 3) of a convex mesh; faces: (F, 3) closed triangles, or None for the hull.
+        surface: of a mesh of any shape that collides only with other surfaces, in its body's frame.
+        collide: takes part in contact.
         visible: is drawn.
     """
 
@@ -56,12 +54,12 @@ class Geom:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tool:
-    """What the robot holds, rigidly, behind its force-torque sensor, in the tool frame.
+    """Rigid tool behind the force-torque sensor, in the tool frame.
 
     Attributes:
         mass: [kg]; center_of_mass: [m]; inertia: xx, yy, zz about the centre of mass [kg m^2].
-        frames: named points of the tool frame; "tip" is always there.
-        hand: name of the frame where a teacher's hand holds it.
+        frames: named points, always with "tip"; "wrist" is the origin by default.
+        hand: name of the point where a teacher holds it.
     """
 
     geoms: tuple[Geom, ...]
@@ -71,15 +69,17 @@ class Tool:
     frames: dict[str, Vector]
     hand: str = "wrist"
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "frames", {"wrist": (0.0, 0.0, 0.0), **self.frames})
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Holder:
-    """How the second arm of a two-armed robot holds the scene's fixture. One-armed robots find it standing still.
+    """Fixture held by the second arm of a two-armed robot.
 
     Attributes:
-        tool: what that arm holds, fixture included, in its tool frame; it is drawn and touched as the fixture is, so
-            it needs no geoms of its own.
-        position: (3,) of the fixture frame in that arm's tool frame [m]; quaternion: its attitude.
+        tool: mass properties of what that arm holds, without geoms.
+        position: (3,) of the fixture frame in that arm's tool frame [m]; quaternion: its orientation.
     """
 
     tool: Tool
@@ -89,16 +89,15 @@ class Holder:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sprung:
-    """A part of the fixture that yields: geoms on a massive plate that slides along one axis, on a spring and a damper.
+    """Compliant part of the fixture: geoms on a plate that slides along an axis on a spring and damper.
 
-    F = K s, with damping 2 zeta sqrt(K m): so a surface has a stiffness in N/m, which the contact itself, whose
-    stiffness depends on the masses that touch, has not. Its weight is compensated; at rest it does not sag.
+    F = K s with damping 2 zeta sqrt(K m), which gives a surface a stiffness independent of the masses.
 
     Attributes:
-        name: one of its own among the scene's sprung parts.
-        geoms: in the fixture frame, undeflected.
-        axis: unit vector of the fixture frame along which it slides.
-        stiffness: K [N/m]; mass: m [kg]; damping_ratio: zeta.
+        name: unique among sprung parts.
+        geoms: undeflected, in the fixture frame.
+        axis: unit vector of sliding in the fixture frame.
+        stiffness: K [N/m]; mass: m [kg], weightless; damping_ratio: zeta.
     """
 
     name: str
@@ -111,21 +110,20 @@ class Sprung:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Mover:
-    """A second part in the fixture that is moved by what touches it: it turns, slides, or lies there free.
+    """Second part of the fixture that contact moves: it turns, slides, or is free.
 
-    One that turns or slides meets the tool and other movers, but not what stands: its range stands for that. A free
-    one has its weight and meets everything.
+    Only a free one has weight and touches the fixture; others have a range.
 
     Attributes:
-        name: one of its own among the scene's sprung parts and movers.
-        geoms: in the fixture frame, as it stands at the start.
+        name: unique among sprung parts and movers.
+        geoms: at the start, in the fixture frame.
         joint: "hinge", "slide" or "free".
-        anchor: a point of the hinge's axis in the fixture frame [m].
-        axis: unit vector of the fixture frame.
+        anchor: point of the hinge's axis in the fixture frame [m].
+        axis: unit vector in the fixture frame.
         mass: [kg]; center_of_mass: in the fixture frame [m]; inertia: (3, 3) about it [kg m^2].
-        stiffness: of its spring [N/m or Nm/rad]; rest: where the spring is slack [m or rad].
-        damping: [N s/m or Nm s/rad]; friction: that its joint has to be moved against [N or Nm].
-        range: of its travel [m or rad] from the start, or None.
+        stiffness: of its spring [N/m or Nm/rad]; rest: of the spring [m or rad].
+        damping: [N s/m or Nm s/rad]; friction: of its joint [N or Nm].
+        range: of travel from the start [m or rad], or None.
     """
 
     name: str
@@ -144,22 +142,21 @@ class Mover:
 
     @property
     def quantities(self) -> tuple[str, ...]:
-        """Names of what `State.second` says of it."""
+        """Names of its entries in `State.second`."""
         return tuple(f"{self.name}.{word}" for word in MOVES[self.joint])
 
 
 MOVES = {"hinge": ("angle",), "slide": ("travel",), "free": ("moved", "turned")}
-"""What is told of a mover, by joint: [rad], [m], and of a free one how far its centre went [m] and it turned [rad]."""
+"""Displacements by joint: angle [rad], travel [m], and of a free one distance [m] and rotation [rad]."""
 
 
 class State(NamedTuple):
-    """Where the tool is, seen from the fixture, for goal predicates, for N trials.
+    """State of N tools in the fixture frame, for goals.
 
     Attributes:
-        tip: pose of the tool's "tip" in the true fixture frame: (N, 3), (N, 3, 3), tool axes.
-        wrench: (N, 6) true wrench of the environment on the tool at the tip, fixture axes.
-        second: (N,) by name how far movers are from where they stood at the start ("gear.angle", see `MOVES`); one
-            that is not named has not moved.
+        tip: pose of "tip" in the true fixture frame: (N, 3), (N, 3, 3), tool axes.
+        wrench: (N, 6) true contact wrench on the tool at the tip, fixture axes.
+        second: (N,) displacements of movers by name ("gear.angle", see `MOVES`); 0 if absent.
     """
 
     tip: Pose
@@ -168,11 +165,11 @@ class State(NamedTuple):
 
 
 class HandStop(NamedTuple):
-    """Where a person stops a part that nothing else stops.
+    """Where a teacher stops a part that nothing else stops.
 
     Attributes:
-        point: (3,) of the tool, seen from the hand, in tool axes [m].
-        at: (3,) where it is to stand, in the fixture frame [m].
+        point: (3,) of the tool, from `hand`, in tool axes [m].
+        at: (3,) its target in the fixture frame [m].
     """
 
     point: Vector
@@ -181,23 +178,22 @@ class HandStop(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Task:
-    """What a person who sees the scene knows, for the simulated teacher only, in the fixture frame.
+    """A teacher's knowledge of the task, in the fixture frame.
 
     Attributes:
-        direction: unit vector along which the teacher pushes, or None to hold still.
-        aligned: attitude (quaternion) of the tool the teacher turns it to, or None to leave the attitude.
-        turn: rotation vector along which a levering teacher turns the tool, or None.
-        to: where the teacher's hand carries the tool in free air, in place of a direction, or None.
+        direction: unit vector of the push, or None to hold still.
+        aligned: target orientation of the tool (quaternion), or None.
+        turn: rotation vector of levering, or None.
+        to: target of the teacher's hand in free air, or None.
         hand: "aligning" (soft and active in rotation), "sliding", "hold" or "lever".
-        starts: nominal starts of the demonstrations, cycled through: dicts of `start.*` quantities.
-        done: predicate of a finished demonstration, or of a finished stage; the goal if None.
-        then: stages that follow, in order, once `done` has held for a person's reaction time; the last one's `done`
-            ends the demonstration, their starts are not looked at.
-        stop: where the person stops pushing along `direction`, where nothing else stops the part.
-        waits_s: how long the person holds still before moving, so that a recording begins in free air [s].
-        held_s: how long the person goes on once it is done and goes no further along `direction` [s].
-        believed: what a blindfolded person knows instead of all this: standard deviations of where the goal is,
-            relative to the start, along and across the surface [m] and about its normal [rad].
+        starts: nominal starts of the demonstrations, in turn: dicts of `start.*` quantities.
+        done: predicate that ends a demonstration or stage; the goal if None.
+        then: further stages, each after `done` has held for a reaction time.
+        stop: where the teacher stops pushing along `direction`.
+        waits_s: rest before the motion [s].
+        held_s: time the teacher continues once done and stopped [s].
+        believed: of a blindfolded teacher, standard deviations of the goal from the start, along and across the surface
+            [m] and about its normal [rad].
     """
 
     direction: Vector | None
@@ -215,12 +211,12 @@ class Task:
 
 
 class Way(NamedTuple):
-    """How far a task has got, for people: "inserted 58 of 60 mm".
+    """Progress of a task, as in "inserted 58 of 60 mm".
 
     Attributes:
-        word: what was done, "inserted".
-        of_m: the whole of it [m].
-        reached: how much of it is done, (N,) [m].
+        word: "inserted".
+        of_m: the total [m].
+        reached: progress (N,) [m].
     """
 
     word: str
@@ -228,33 +224,31 @@ class Way(NamedTuple):
     reached: Callable[[State], Float]
 
     def told(self, reached_m: float | None) -> dict[str, Any]:
-        """As plain values for a trace: `word`, `of_m`, `reached_m` [m], which is None where it is not known."""
+        """Values for a trace: `word`, `of_m`, `reached_m` [m] or None."""
         return {"word": self.word, "of_m": self.of_m, "reached_m": reached_m}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Scene:
-    """Everything about a task but the robot.
+    """A task without the robot.
 
     Attributes:
         fixture: geoms in the fixture frame.
-        sprung: parts of the fixture that yield, and second parts that are moved.
-        friction: Coulomb coefficient of every contact between tool and fixture.
+        sprung: compliant and movable parts.
+        friction: Coulomb coefficient between tool and fixture.
         start_tip: (3,) nominal start of the tip in the fixture frame.
-        start_quaternion: nominal attitude of the tool frame in the fixture frame.
-        start_lift: extra height of the start (N,) [m] for offsets (N, 3) [m] and tilts (N, 3) [rad] of the tip, so that
-            no declared start penetrates the fixture.
+        start_quaternion: nominal start orientation of the tool frame there.
+        start_lift: extra start height (N,) [m] for offsets (N, 3) [m] and tilts (N, 3) [rad].
         goal: predicate per trial.
         goal_error: distance to the goal: (N,) [m] and (N,) [rad].
-        holder: lets a second arm hold the fixture; None: it always stands still.
-        way: how far a run has got, of a task that has a depth; None for any other.
-        analytic: figures of closed-form theory for the report (e.g. {"largest_tilt": ...}).
-        params: the parameters it was built from, plain values.
-        places: named poses in the fixture frame that skills may go by: position and quaternion of each.
+        holder: lets a second arm hold the fixture.
+        way: progress of a task with a depth.
+        analytic: closed-form figures for the report.
+        params: the parameters it was built from.
+        places: named poses in the fixture frame for skills: position and quaternion.
 
     Raises:
-        InputError: a mesh that collides is not convex, not closed, flat or of the wrong scale.
-        UnknownName: a geom is of no known kind.
+        InputError, UnknownName: a geom cannot collide as drawn, or is of unknown kind.
     """
 
     name: str
@@ -283,7 +277,6 @@ class Scene:
 
 
 def _check(geom: Geom, where: str) -> None:
-    """Refuse a geom that would collide as something else than it is drawn."""
     if geom.kind not in KINDS:
         raise UnknownName("kind", geom.kind, KINDS, where=where)
     if geom.kind != "mesh":

@@ -1,8 +1,6 @@
-"""Parts of any shape in contact: our own contact generator, `narrow_phase.c`, in MuJoCo's table of collision functions.
+"""Contact of parts of any shape: a contact generator in C in MuJoCo's table of collision functions.
 
-A `Surface` is a part as contact needs it: its triangles, signed distance on a grid, and points. The points of each of
-two parts are looked up in the distance of the other, and what lies inside goes to MuJoCo's solver. The C text is built
-once for the MuJoCo that is installed, into the user's cache. Nothing is built where no compiler is.
+The points of each part are looked up in the other's grid of signed distances.
 """
 
 from __future__ import annotations
@@ -22,8 +20,6 @@ from skillframe.fmu.build import build_library
 from skillframe.frames import Float, cross, norm
 
 Ints = NDArray[np.int64]
-TOLERANCE = 1e-6
-"""A cell of the grid is taken as it is where distance is linear in it within this [m]; ours."""
 SOURCES = ("surfaces.h", "distance_grid.c", "narrow_phase.c")
 
 
@@ -53,9 +49,8 @@ class Triangles:
 
     Attributes:
         corners: (T, 3, 3) [m].
-        normals: (T, 7, 3) unit normals of the face, of edges ab, bc, ca and of corners a, b, c. Those of an edge are
-            the mean of its faces', those of a corner are weighted by angles, so that they tell inside from outside
-            (J. A. Baerentzen and H. Aanaes, IEEE TVCG 11(3), 2005).
+        normals: (T, 7, 3) of the face, edges ab, bc, ca and corners a, b, c (J. A. Baerentzen and H. Aanaes, IEEE TVCG
+            11(3), 2005).
     """
 
     corners: Float
@@ -67,12 +62,12 @@ class DistanceGrid:
     """Signed distance on a grid.
 
     Attributes:
-        origin: (3,) of the first node [m]; cell: [m].
-        value: (X, Y, Z) at the nodes [m], below zero inside.
-        gap: (X, Y, Z) of the cell that begins there: 0 where a point may be inside, else how far it is from there.
-        listed: one bit a node, whether the cell that begins there has a list; before: listed cells before each word.
-        start: (cells + 1,) into triangle: those that can be nearest within a listed cell.
-        disagree: share of the nodes whose three rays disagree on what is inside.
+        origin: (3,) first node [m]; cell: [m].
+        value: (X, Y, Z) at the nodes [m], negative inside.
+        gap: (X, Y, Z) coded distance of a cell to the inside, 0 where a point may be inside.
+        listed: one bit per node if its cell has a list; before: listed cells before each word.
+        start: (cells + 1,) into triangle: candidates for the nearest in a listed cell.
+        disagree: share of nodes whose three rays disagree on inside.
     """
 
     origin: Float
@@ -88,15 +83,15 @@ class DistanceGrid:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Surface:
-    """A part as contact needs it. `turn` (3, 3) and `shift` (3,) take its own frame to that of the body it is on.
+    """Contact data of a part. `turn` (3, 3) and `shift` (3,) transform it to its body's frame.
 
     Attributes:
         triangles: of the part.
-        grids: one, or a fine one where parts can meet and a coarse one of all.
-        points: (P, 3) on the surface [m], block by block; first: (B + 1,) where each block begins.
+        grids: one, or a fine one where parts can meet and a coarse one.
+        points: (P, 3) on the surface [m], by block; first: (B + 1,) start of each block.
         balls: (B, 4) centre and radius of each block [m].
-        group: (G + 1,) where each group of blocks begins; around: (G, 4) their balls.
-        apart: least distance of two contacts [m].
+        group: (G + 1,) start of each group of blocks; around: (G, 4) their balls.
+        apart: least distance of contacts [m].
     """
 
     triangles: Triangles
@@ -111,7 +106,7 @@ class Surface:
     shift: Float
 
     def look_up(self, points: Float) -> Float:
-        """Signed distances (P,) of points (P, 3) of the part's frame, as contacts see them [m]."""
+        """Signed distances (P,) of points (P, 3) in the part's frame, as used for contact [m]."""
         points = np.ascontiguousarray(points, dtype=np.float64)
         out = np.empty(len(points))
         _require().skillframe_look_up(ctypes.byref(_part(self)), len(points), _at(points), _at(out))
@@ -119,12 +114,12 @@ class Surface:
 
 
 def available() -> bool:
-    """Whether there is a contact generator: it was built, or can be."""
+    """Whether the contact generator can be used."""
     return library() is not None
 
 
 def opened() -> ctypes.CDLL | None:
-    """The generator's library, built if it is not there or does not open, or None where it cannot be built."""
+    """Library of the generator, built if necessary, or None."""
     import mujoco
 
     folder = Path(__file__).parent
@@ -138,14 +133,14 @@ def opened() -> ctypes.CDLL | None:
             return None
         try:
             return ctypes.CDLL(str(built), mode=ctypes.RTLD_LOCAL)
-        except OSError:  # damaged in the cache
+        except OSError:
             built.unlink(missing_ok=True)
     return None
 
 
 @lru_cache(maxsize=1)
 def library() -> ctypes.CDLL | None:
-    """The contact generator, in MuJoCo's table from now on, or None where it cannot be built."""
+    """Install the contact generator in MuJoCo's table, or return None."""
     import mujoco
 
     found = opened()
@@ -159,14 +154,12 @@ def library() -> ctypes.CDLL | None:
 
 
 def _engine() -> ctypes.CDLL:
-    """MuJoCo's own library, which Python's bindings have loaded."""
     import mujoco
 
     return ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("libmujoco.*"))), mode=ctypes.RTLD_GLOBAL)
 
 
 def _loaded_engine() -> bool:
-    """Let the generator find MuJoCo's functions."""
     try:
         _engine()
     except (OSError, StopIteration):
@@ -213,10 +206,10 @@ _NUMBERS: weakref.WeakKeyDictionary[Surface, int] = weakref.WeakKeyDictionary()
 
 
 def number_of(surface: Surface) -> int:
-    """The number by which the generator knows a surface, as long as that is there.
+    """Number of a surface in the generator, registered on first use.
 
     Raises:
-        SkillframeError: there is no compiler, or there are a thousand surfaces already.
+        SkillframeError: no compiler, or a thousand surfaces.
     """
     if surface not in _NUMBERS:
         part = _part(surface)
@@ -230,12 +223,12 @@ def number_of(surface: Surface) -> int:
 
 
 def _removed(number: int, part: _Part) -> None:
-    """Forget a surface. The record, which the generator points at, lives as long as this call waits."""
+    """Remove a surface. The finalizer keeps `part` alive until then."""
     _require().skillframe_remove(number)
 
 
 def triangles_of(vertices: Float, faces: Ints) -> Triangles:
-    """Triangles and normals of a closed mesh (V, 3), (F, 3). Those without area are left out."""
+    """Triangles and normals of a closed mesh (V, 3), (F, 3), without degenerate ones."""
     raw = cross(vertices[faces[:, 1]] - vertices[faces[:, 0]], vertices[faces[:, 2]] - vertices[faces[:, 0]])
     size = norm(raw)
     faces, raw, size = faces[size > 1e-18], raw[size > 1e-18], size[size > 1e-18]
@@ -258,10 +251,10 @@ def triangles_of(vertices: Float, faces: Ints) -> Triangles:
 
 
 def grid_of(triangles: Triangles, low: Float, high: Float, cell: float) -> DistanceGrid:
-    """Signed distance of triangles on a grid over a box [m].
+    """Signed distance grid of triangles over a box [m].
 
     Raises:
-        SkillframeError: there is no compiler, or no memory.
+        SkillframeError: no compiler, or no memory.
     """
     found = _require()
     size = np.maximum(np.ceil((high - low) / cell).astype(int) + 1, 2)
@@ -275,9 +268,13 @@ def grid_of(triangles: Triangles, low: Float, high: Float, cell: float) -> Dista
     made = _grid(grid)
     if found.skillframe_values(ctypes.byref(made), ctypes.byref(mesh), _at(value), ctypes.byref(disagree)):
         raise SkillframeError(f"a grid of {value.size:,} nodes for contact does not fit into memory; take larger cells")
-    count = int(found.skillframe_mark(ctypes.byref(made), TOLERANCE, _at(listed)))
+    linear_within = 1e-6  # m
+    count = int(found.skillframe_mark(ctypes.byref(made), linear_within, _at(listed)))
     found.skillframe_gaps(ctypes.byref(made), _at(gap))
-    bits = np.bitwise_count(listed) if hasattr(np, "bitwise_count") else _bits(listed)
+    if hasattr(np, "bitwise_count"):
+        bits = np.bitwise_count(listed)
+    else:
+        bits = np.unpackbits(listed.view(np.uint8)).reshape(-1, 64).sum(axis=1).astype(np.uint8)
     before = (np.cumsum(bits, dtype=np.uint32) - bits).astype(np.uint32)
     made.before = _at(before).value
     nearest, many, pairs = np.zeros(count, dtype=np.float32), np.zeros(count, dtype=np.int32), ctypes.c_void_p()
@@ -294,16 +291,11 @@ def grid_of(triangles: Triangles, low: Float, high: Float, cell: float) -> Dista
     )  # fmt: skip
 
 
-def _bits(words: NDArray[np.uint64]) -> NDArray[np.uint8]:
-    found: NDArray[np.uint8] = np.unpackbits(words.view(np.uint8)).reshape(-1, 64).sum(axis=1).astype(np.uint8)
-    return found
-
-
 def exact_distances(triangles: Triangles, points: Float) -> Float:
-    """Signed distances (P,) of points (P, 3) from a closed mesh, triangle by triangle [m].
+    """Exact signed distances (P,) of points (P, 3) from a closed mesh [m].
 
     Raises:
-        SkillframeError: there is no compiler, or no memory.
+        SkillframeError: no compiler, or no memory.
     """
     points = np.ascontiguousarray(points, dtype=np.float64)
     out = np.empty(len(points))

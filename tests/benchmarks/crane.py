@@ -68,7 +68,7 @@ def timed(count, seconds=SECONDS):
 def uncompiled():
     """The loop as a machine without a compiler runs it that was given a built FMU: interpreter, ctypes."""
     stack = fresh_banks()
-    stack.enter_context(mock.patch("skillframe.machine.law.generated.build_library", return_value=None))
+    stack.enter_context(mock.patch("skillframe_hydraulics.law.generated.build_library", return_value=None))
     stack.enter_context(mock.patch("skillframe.fmu.driver.compiled_step", return_value=None))
     return stack
 
@@ -76,15 +76,15 @@ def uncompiled():
 def reference_actuators():
     """The loop as it is without a compiler and without a built FMU: interpreter, law and reference cylinders."""
     stack = fresh_banks()
-    for module in ("fmu.build", "machine.cylinder.opening"):
-        stack.enter_context(mock.patch(f"skillframe.{module}.find_compiler", return_value=None))
+    for module in ("skillframe.fmu.build", "skillframe_hydraulics.cylinder.bank"):
+        stack.enter_context(mock.patch(f"{module}.find_compiler", return_value=None))
     return stack
 
 
 def fresh_banks():
     """Banks that were opened before count as not there, here and afterwards."""
     stack = ExitStack()
-    stack.enter_context(mock.patch("skillframe.fmu.kept._KEPT", {}))
+    stack.enter_context(mock.patch("skillframe.fmu.opening._KEPT", {}))
     return stack
 
 
@@ -99,7 +99,7 @@ def second_run():
 
 def rows(show):
     """Print the crane's rows with `run.show`."""
-    from skillframe.fmu.toolchain import find_compiler
+    from skillframe.fmu.build import find_compiler
 
     if find_compiler() is None:
         print("crane: no C compiler here")

@@ -88,8 +88,8 @@ def swinging(facts, dead_volume):
 
 def rows(show):
     """Print the driver's rows with `run.show`."""
+    from skillframe.fmu.build import find_fmu
     from skillframe.fmu.inspection import inspect_fmu
-    from skillframe.fmu.library import find_fmu
 
     for version in (2, 3):
         facts = inspect_fmu(find_fmu("hydraulic_cylinder", version=version))

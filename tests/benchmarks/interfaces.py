@@ -7,7 +7,7 @@ import numpy as np
 
 from skillframe.execution.executor import begin
 from skillframe.robot.interface import Control
-from skillframe.world.sensors import SensorSettings
+from skillframe.world.quantities import SensorSettings
 from tests.benchmarks.timing import timed_run
 from tests.laws.pushing import Push, impedance
 from tests.laws.runs import generators, setup
@@ -40,7 +40,7 @@ def ratios(show, counts=(1, 96)):
 
 def real_time(show, bound=6.0):
     """One run of the UR5e told positions, with the peg and a rather fine trace, in contact for nearly all of it."""
-    setting = replace(setup("ur5e_position", "peg_in_hole"), sensors=SensorSettings())
+    setting = replace(setup("ur5e", "peg_in_hole"), sensors=SensorSettings())
     skill, tilt = (
         Push((0.0, 0.0, -1.0), impedance("x", "y"), speed=0.02, stall=False),
         {"start.tilt_y": np.array([0.1])},

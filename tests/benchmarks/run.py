@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
 from skillframe.campaign.runner import CHUNK  # noqa: E402
-from skillframe.world.sensors import SensorSettings  # noqa: E402
+from skillframe.world.quantities import SensorSettings  # noqa: E402
 from tests.benchmarks import crane, engine, interfaces, parts, segmenter  # noqa: E402
 from tests.benchmarks.timing import Recorded, one_trial_loop, replay, timed_run  # noqa: E402
 from tests.laws.pushing import Push, impedance  # noqa: E402
@@ -106,7 +106,7 @@ def single(name, bound):
 def two_arms():
     """A batch of 32 insertions with two arms in contact, each trial against real time."""
     from skillframe.errors import UnknownName
-    from skillframe.execution.arms import simulate_arms
+    from skillframe.execution.drives.arms import simulate_arms
     from skillframe.execution.executor import Setup
     from skillframe.execution.prepare import load_robot_model, load_world
     from skillframe.extend.registry import registry
@@ -197,11 +197,12 @@ def command_line():
 
 
 def learning():
+    from skillframe_teaching.sessions import record
+    from skillframe_teaching.teacher import TeacherSettings
+
     from skillframe.errors import UnknownName
     from skillframe.extend.records import LearnOptions
     from skillframe.extend.registry import registry
-    from skillframe.teaching.sessions import record
-    from skillframe.teaching.teacher import TeacherSettings
 
     try:
         learn = registry().skill("lmc").learn

@@ -1,8 +1,8 @@
-"""Couplers shown by pairs of demonstrations: the learned push with and without the heading of a swung point.
+"""Couplers shown by pairs of demonstrations: the learned push and one written by hand.
 
     python -m tests.figures.couplers --pairs 20 --seed 8888
 
-Both pushes, and one straight down written by hand, then run on the same draws with the fixture moved, as in
+It, and one straight down written by hand, then run on the same draws with the fixture moved, as in
 plugins/baselines/comparison/hose_coupler.toml, at the tip. All runs are one simulation.
 """
 
@@ -11,11 +11,8 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from math import pi
 
 import numpy as np
-import pytest
-import skillframe_lmc.heading
 
 from skillframe.campaign.statistics import clopper_pearson
 from skillframe.demonstration.record import Demonstration
@@ -30,11 +27,8 @@ WORLD, DRAWS = "hose_coupler", 4
 
 
 def pushes(pairs: Sequence[Sequence[Demonstration]]) -> dict[str, list[Row]]:
-    """A row a pair: as learned, without the heading of a swung point, and straight down with free turns."""
+    """A row a pair: as learned, and straight down with free turns."""
     rows = {"LMC": [lmc_row(pair, at=None) for pair in pairs]}
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(skillframe_lmc.heading, "SWUNG", pi)
-        rows["LMC, chords only"] = [lmc_row(pair, at=None) for pair in pairs]
     straight = push_along(DOWN)
     straight.stiffness[3:, 3:] = 0.0
     return rows | {"straight down": [straight] * len(pairs)}

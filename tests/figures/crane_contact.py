@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from skillframe_hydraulics.declared import Gains, MachineNoise, with_gains, with_noise
 from skillframe_papers.rows import crane_runs
 
-from skillframe.robot.driven import Gains, MachineNoise
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot
 from skillframe.world.scene import Geom, Sprung
@@ -103,7 +103,7 @@ def precise():
     """The crane with encoders of 20 bits, 6e-6 rad, and filters and gains that their noise allows."""
     spec = load_robot("hiab_xs031")
     sensors, gains = MachineNoise(encoder=ENCODER, corner_hz=60.0), Gains(body=1e4, force_corner_hz=50.0)
-    return load_model(dataclasses.replace(spec, sensors=sensors, gains=gains))
+    return load_model(with_gains(with_noise(spec, sensors), gains))
 
 
 def pressed(surface, damping=5e4, mass=1.0, friction=1.0, seed=1, ratio=0.5, delay=0.0, robot=None):

@@ -10,13 +10,13 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from skillframe_hydraulics.law import vdc_actuator as act
+from skillframe_hydraulics.law.hydraulic import Measured, Reference
 
 from skillframe.cosim import CosimSettings, Master
-from skillframe.execution.drives.coupled import CoupledPlant
+from skillframe.execution.drives.actuated import CoupledPlant
 from skillframe.fmu.actuator import ActuatorSpec
 from skillframe.fmu.opening import open_actuators
-from skillframe.machine.law import vdc_actuator as act
-from skillframe.machine.law.hydraulic import Measured, Reference
 from skillframe.robot.chain import ClosedChain
 from skillframe.world.placement import fixture_poses
 from skillframe.world.plant import Plant

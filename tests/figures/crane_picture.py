@@ -4,8 +4,8 @@ import sys
 
 import matplotlib as mpl
 import numpy as np
+from skillframe_hydraulics.law.hydraulic import HydraulicGains
 
-from skillframe.machine.law.hydraulic import HydraulicGains
 from tests.figures.crane_contact import pressed
 from tests.figures.crane_motion import DT, Truth, run
 from tests.figures.crane_rivals import TUNED, Rivals, Vdc

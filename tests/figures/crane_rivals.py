@@ -14,11 +14,11 @@ such a loop is as slow as the oil lets it be. What counts is the rms error of th
 from typing import NamedTuple
 
 import numpy as np
+from skillframe_hydraulics.law import vdc_actuator as act
+from skillframe_hydraulics.law.hydraulic import HydraulicGains
+from skillframe_hydraulics.law.hydraulic_compiled import CompiledLaw
 
-from skillframe.machine.law import vdc_actuator as act
-from skillframe.machine.law.hydraulic import HydraulicGains
-from skillframe.machine.law.hydraulic_compiled import CompiledLaw
-from skillframe.signals.rates import RateFilter
+from skillframe.signals import RateFilter
 from tests.figures.crane_motion import DT, Truth, begin, believed, figures, free_reference, known, run
 from tests.laws.vdc_loop import leg, task
 from tests.oracle import valve_law
@@ -84,8 +84,8 @@ class Rivals:
     def __call__(self, t, measured):
         desired, zdd = self.desired(t)
         states = [self.chain.at(z, zd) for z, zd in zip(measured.z, measured.rate, strict=True)]
-        x, xd = (np.array(rows) for rows in zip(*(s.piston for s in states), strict=True))
-        x_d, xd_d = desired.piston
+        x, xd = (np.array(rows) for rows in zip(*(s.driven_motion for s in states), strict=True))
+        x_d, xd_d = desired.driven_motion
         forces = [self.force(law, s, desired, zdd) for law, s in zip(self.laws, states, strict=True)]
         force = np.array(forces) + valve_law.friction(known(), xd_d)
         if self.fresh:

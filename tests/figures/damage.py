@@ -13,8 +13,8 @@ from collections import Counter
 from dataclasses import replace
 
 import numpy as np
+from skillframe_recordings.audit import DemonstrationAudit, audit
 
-from skillframe.conditioning.audit import DemonstrationAudit, audit
 from skillframe.demonstration.record import Demonstration
 from tests.figures import edits
 from tests.figures.edits import Edit, Edited
@@ -36,8 +36,8 @@ WHOLES: dict[str, tuple[Edit, tuple[str, ...]]] = {
     "pose at 8 to 15 Hz": (edits.slow_pose, ("pose: moves",)),
     "weight left in": (edits.weigh, ("weight:", "bias:", "wrench frame:")),
     "weight left in, tared": (edits.weigh_tared, ("weight:", "wrench frame:")),
-    "quaternion w-first": (edits.quaternion_order, ("quaternion:", "attitude:")),
-    "wrench in tool axes": (edits.frame, ("wrench frame:", "wrench sign:", "attitude:")),
+    "quaternion w-first": (edits.quaternion_order, ("quaternion:", "orientation:")),
+    "wrench in tool axes": (edits.frame, ("wrench frame:", "wrench sign:", "orientation:")),
     "wrong sign": (edits.sign, ("wrench sign:", "wrench frame:")),
 }
 

@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from plugins.recordings.tests.test_lateness import late as shifted
 from skillframe.demonstration.record import Demonstration
 from skillframe.frames import Float, cross, norm, rotate, rotate_spatial
-from tests.unit.conditioning.test_lateness import late as shifted
 
 
 class Edited(NamedTuple):

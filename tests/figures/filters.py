@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.signal import butter, sosfilt, sosfilt_zi, sosfiltfilt
+from skillframe_recordings.conditioning.offline import filter_wrench, smooth
+from skillframe_recordings.conditioning.wrench_model import model_of
 
-from skillframe.conditioning.noise import model_of, noise_figures
-from skillframe.conditioning.offline import filter_wrench, smooth
+from skillframe.demonstration.contact import noise_figures
 from skillframe.demonstration.record import Demonstration
 from skillframe.frames import Float, norm
 from tests.figures.recorded import recordings

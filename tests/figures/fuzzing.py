@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from skillframe_testkit.suites import example_demonstrations
 
+from plugins.recordings.tests.bags_written import ENDINGS, poses, wrenches, write_bag
 from skillframe.cli.main import run as run_command
 from skillframe.demonstration.record import Demonstration
 from skillframe.extend.reading import write_demonstration
-from skillframe.testing import example_demonstrations
 from tests.oracle.fuzz import Case
-from tests.unit.demonstration.bags_written import ENDINGS, poses, wrenches, write_bag
 from tests.unit.demonstration.conftest import make
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -53,13 +53,13 @@ NUMERIC = [
     ["run", "{}/peg.skill.json", *SHORT, "--seed", "#"], ["run", "{}/peg.skill.json", *SHORT, "--rate", "#"],
     ["run", "{}/peg.skill.json", *SHORT, "--set", "start.offset_x=#"],
     ["run", "{}/peg.skill.json", *SHORT, "--set", "sensor.force_noise=#"],
-    ["run", "{}/peg.skill.json", *SHORT, "--coc", "0,0,#"], ["demonstration", "check", "{}/demo.csv", "--rate", "#"],
-    ["demonstration", "convert", "{}/demo.csv", "--from", "#", "--out", "{}/out/a.npz"],
-    ["demonstration", "convert", "{}/demo.csv", "--to", "#", "--out", "{}/out/a.npz"],
-    ["condition", "{}/demo.csv", "--corner", "#", "--out", "{}/out/a.npz"],
-    ["condition", "{}/demo.csv", "--free-air", "0,#", "--out", "{}/out/a.npz"],
+    ["run", "{}/peg.skill.json", *SHORT, "--coc", "0,0,#"], ["check", "{}/demo.csv", "--set", "rate=#"],
+    ["convert", "{}/demo.csv", "--set", "from=#", "--out", "{}/out/a.npz"],
+    ["convert", "{}/demo.csv", "--set", "to=#", "--out", "{}/out/a.npz"],
+    ["filter", "{}/demo.csv", "--corner", "#", "--out", "{}/out/a.npz"],
+    ["filter", "{}/demo.csv", "--free-air", "0,#", "--out", "{}/out/a.npz"],
     ["export", "{}/peg.skill.json", "--to", "crisp", "--phase", "#", "--out", "{}/out/a.yaml"],
-    ["export", "{}/peg.skill.json", "--to", "crisp", "--attitude", "0,0,#,1", "--out", "{}/out/a.yaml"],
+    ["export", "{}/peg.skill.json", "--to", "crisp", "--orientation", "0,0,#,1", "--out", "{}/out/a.yaml"],
     ["learn", "{}/demo.csv", "--at", "#,0,0", "--out", "{}/out/a.json"],
     ["campaign", "replay", "{}/folder", "#"],
 ]  # fmt: skip
@@ -119,25 +119,23 @@ def recordings(folder: Path) -> list[Case]:
     text = (folder / "demo.csv").read_bytes()
     found = []
     for name, share in (("demo.csv", 2.0), ("demo.npz", 2.0)):
-        commands = [["demonstration", "check", f"{{}}/{name}"]] * 3
-        commands += [["demonstration", "convert", f"{{}}/{name}", "--out", "{}/out/a.npz"]]
-        commands += [["condition", f"{{}}/{name}", "--no-bias", "--out", "{}/out/a.csv"]]
+        commands = [["check", f"{{}}/{name}"]] * 3
+        commands += [["convert", f"{{}}/{name}", "--out", "{}/out/a.npz"]]
+        commands += [["filter", f"{{}}/{name}", "--no-bias", "--out", "{}/out/a.csv"]]
         commands += [["learn", f"{{}}/{name}", "--out", "{}/out/a.json"]]
         found.append(Case(name[5:], {name: (folder / name).read_bytes()}, name, commands, share))
     columns = "t,px,py,pz,qx,qy,qz,qw,fx,fy,fz,tx,ty,tz"
     blank = b"\n".join(text.replace(b",", b" ").splitlines()[1:]) + b"\n"
-    given = [["demonstration", "check", "{}/demo.txt", "--columns", columns]]
+    given = [["check", "{}/demo.txt", "--set", f"columns={columns}"]]
     found.append(Case("delimited text", {"demo.txt": blank}, "demo.txt", given))
     files = {"demo.csv": text, "demo.meta.toml": META.encode()}
-    found.append(Case("meta.toml", files, "demo.meta.toml", [["demonstration", "check", "{}/demo.csv"]], 2.0))
+    found.append(Case("meta.toml", files, "demo.meta.toml", [["check", "{}/demo.csv"]], 2.0))
     short = some(30)
     for ending in ENDINGS:
         (folder / ending[1:]).mkdir()
         topics = {"/tool": poses(short), "/ft": wrenches(short)}
         bag = write_bag(folder / ending[1:] / f"demo{ending}", topics).read_bytes()
-        found.append(
-            Case(ending, {f"demo{ending}": bag}, f"demo{ending}", [["demonstration", "check", f"{{}}/demo{ending}"]])
-        )
+        found.append(Case(ending, {f"demo{ending}": bag}, f"demo{ending}", [["check", f"{{}}/demo{ending}"]]))
     return found
 
 
@@ -150,14 +148,14 @@ def skills(folder: Path) -> list[Case]:
     do("learn", *names, "--out", folder / "peg.skill.json")
     do("segment", *names, "--phases", "2", "--out", folder / "policy.json")
     policy, skill = ((folder / name).read_bytes() for name in ("policy.json", "peg.skill.json"))
-    show = [["skill", "show", "{}/policy.json"]]
+    show = [["show", "{}/policy.json"]]
     return [
         Case("policy.json", {"policy.json": policy}, "policy.json", show, 2.0),
         Case(
             "skill.json", {"peg.skill.json": skill}, "peg.skill.json",
             [
-                *[["skill", "show", "{}/peg.skill.json"]] * 3,
-                ["skill", "explain", "{}/peg.skill.json", "--out", "{}/out/a.html"],
+                *[["show", "{}/peg.skill.json"]] * 3,
+                ["show", "{}/peg.skill.json", "--page", "{}/out/a.html"],
                 ["export", "{}/peg.skill.json", "--to", "crisp", "--out", "{}/out/a.yaml"],
                 ["run", "{}/peg.skill.json", *SHORT, "--out", "{}/out/a.npz"],
             ], 2.0,
@@ -172,7 +170,7 @@ def robots() -> list[Case]:
         files = {f"{name}/{n}": c for n, c in files.items()}
         for target in files:
             kind = "robot.toml" if target.endswith(".toml") else "URDF"
-            check = [["robots", "check", f"{{}}/{target}"], ["robots", "show", f"{{}}/{name}/robot.toml"]]
+            check = [["robots", "--check", f"{{}}/{target}"], ["robots", f"{{}}/{name}/robot.toml"]]
             found.append(Case(kind, files, target, check, 0.6))
     return found
 
@@ -227,8 +225,8 @@ def fmus() -> list[Case]:
     """An FMU that is checked; without a C compiler there is none."""
     if shutil.which("cc") is None:
         return []
-    from skillframe.fmu.library import find_fmu
+    from skillframe.fmu.build import find_fmu
 
     content = Path(find_fmu("hydraulic_cylinder")).read_bytes()
-    check = ["fmu", "check", "{}/a.fmu"]
+    check = ["fmu", "{}/a.fmu"]
     return [Case("fmu", {"a.fmu": content}, "a.fmu", [check, [*check, "--json"]], 0.3)]

@@ -2,7 +2,7 @@
 
     python -m tests.figures.kinder FOLDER [BLOCKS] [ROBOT ...]
 
-keeps every campaign in FOLDER, passes over those that are there, and prints the table of docs/evidence/kinder.md.
+keeps every campaign in FOLDER, passes over those that are there, and prints the table of docs/evidence/data/kinder.csv.
 BLOCKS of 8 gives 256 draws a cell; robots are named by how their names begin.
 
 "As it is" is the robot as shipped, with the interface of `ROBOTS`: bodies collide, motors have efforts, speeds and
@@ -35,7 +35,7 @@ from skillframe.campaign.folder import load
 from skillframe.campaign.rows import ChunkJob, Row
 from skillframe.campaign.runner import Options, run_campaign
 from skillframe.control.contact import TrueContact
-from skillframe.robot.spec import robot_names
+from skillframe.robot.spec import load_robot, robot_names
 
 TRIALS, TEACHINGS, BLOCKS, SEED = 16, (1, 2), 8, 20261123
 """16 draws a block, eight blocks a teaching, two teachings: 256 a cell. A table can be looked at after each block."""
@@ -47,18 +47,19 @@ ROBOTS = {
     "panda, torque": ("panda", ""),
     "fr3, torque": ("fr3", ""),
     "panda, velocity": ("panda", 'interface = "velocity"\ndelay_s = 0.003\nbandwidth_hz = 50.0\n'),
-    "ur5e, position": ("ur5e", 'interface = "position"\ndelay_s = 0.008\nbandwidth_hz = 10.0\n'),
+    "ur5e, position": ("ur5e_torque", 'interface = "position"\ndelay_s = 0.008\nbandwidth_hz = 10.0\n'),
     "kuka_iiwa14, position": ("kuka_iiwa14", 'interface = "position"\ndelay_s = 0.01\nbandwidth_hz = 15.0\n'),
 }
 RATES = {"ur5e, position": 500, "kuka_iiwa14, position": 200}
 TASKS: dict[str, dict[str, Any]] = {
     "peg_in_hole": {
         "duration_s": 8.0,
+        "set": {"start.offset_z": 0.002},
         "vary": {"fixture.offset_x": {"sobol": [-0.008, 0.008]}, "fixture.tilt_y": {"sobol": [-0.12, 0.12]}},
     },
     "valley": {
         "duration_s": 6.0,
-        "set": {"start.offset_z": 0.035, "world.friction": 0.5},
+        "set": {"start.offset_z": 0.05, "world.friction": 0.5},
         "vary": {"fixture.offset_x": {"sobol": [-0.015, 0.015]}, "fixture.tilt_y": {"sobol": [-0.45, 0.45]}},
     },
     "hose_coupler": {
@@ -80,10 +81,11 @@ def made(folder: Path, robot: str, kinder: bool) -> Path:
     if out.exists():
         return out
     shutil.copytree(robot_names()[name], out)
-    text = (out / "robot.toml").read_text(encoding="utf-8")
+    text = (out / "robot.toml").read_text(encoding="utf-8").replace('"../ur5e/', '"')
+    shutil.copy(load_robot(name).urdf, out)
     if kinder:
         text += "\n[collisions]\nenabled = false\n"
-        _without_motors(out / f"{name}.urdf")
+        _without_motors(out / load_robot(name).urdf.name)
     else:
         text = text.replace("rate_hz = 1000\n", f"rate_hz = {RATES.get(robot, 1000)}\n{interface}", 1)
     (out / "robot.toml").write_text(text, encoding="utf-8")

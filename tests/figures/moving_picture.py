@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 from contourpy import contour_generator
+from skillframe_reports.markup import escape
+from skillframe_reports.raster import blank, paint
+from skillframe_reports.shapes import merge
+from skillframe_reports.stage import stage_of
 
 from skillframe.execution.trace import Trace
-from skillframe.reports.markup import escape
-from skillframe.reports.raster import blank, paint
-from skillframe.reports.shapes import merge
-from skillframe.reports.stage import stage_of
 
 FRAMES, HOLD = 36, 14
 """Frames of the motion, and how many frames long its end stays."""

@@ -12,10 +12,10 @@ import os
 from pathlib import Path
 
 import numpy as np
+from skillframe_recordings.audit import audit
 
-from skillframe.conditioning.audit import audit
 from skillframe.demonstration.record import Demonstration
-from skillframe.document.source import learned
+from skillframe.document.file import learned
 from skillframe.extend.reading import read_demonstration
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.extend.registry import registry

@@ -1,4 +1,4 @@
-"""What `--columns auto` says of real recordings written anew: `python -m tests.figures.proposed`.
+"""What `--layout auto` says of real recordings written anew: `python -m tests.figures.proposed`.
 
 Each recording is written as a table without a header: with its quaternion w-last and w-first, with its attitude as
 angles about moving axes in the six orders, with its wrench in tool axes, and with the other sign. *Right* is what
@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+from skillframe_recordings.proposal.reading import propose_reading
 
 from skillframe.demonstration.record import Demonstration
-from skillframe.extend.reading import propose_reading
 from skillframe.frames import Float, rotate_spatial
 from tests.figures.recorded import recordings
 
@@ -40,7 +40,7 @@ def verdict(path: Path, what: str, right: str) -> str:
 def wrench_verdict(path: Path, frame: str, sign: str) -> str:
     """Whether axes and sign are proposed as they were written."""
     proposal = propose_reading(path)
-    if any(text.startswith("axes and sign") for text in proposal.undecided):
+    if any(text.startswith("axes and sign") for text in (*proposal.undecided, *proposal.missing)):
         return "open"
     found = proposal.settings
     said = found.get("wrench_frame"), found.get("wrench_sign")
@@ -61,7 +61,7 @@ def rows(d: Demonstration, folder: Path) -> dict[str, Counter[str]]:
         "quaternion w-first": Counter([verdict(written(folder, d, first, d.wrench), "quaternion", "wxyz")]),
         "the same, wrench in tool axes": Counter([verdict(written(folder, d, first, in_tool), "quaternion", "wxyz")]),
         "six orders of angles": Counter(
-            verdict(written(folder, d, values, d.wrench), "attitude", order) for order, values in moving.items()
+            verdict(written(folder, d, values, d.wrench), "orientation", order) for order, values in moving.items()
         ),
         "wrench in base axes": Counter([wrench_verdict(written(folder, d, q, d.wrench), "base", "environment")]),
         "wrench in tool axes": Counter([wrench_verdict(written(folder, d, q, in_tool), "tool", "environment")]),

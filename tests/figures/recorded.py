@@ -6,7 +6,7 @@ from pathlib import Path
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.extend.reading import read_demonstration
-from skillframe.paths import recordings_dir
+from tests.references import recordings_dir
 
 POSE, WRENCH = "px,py,pz,qx,qy,qz,qw", "fx,fy,fz,tx,ty,tz"
 
@@ -40,3 +40,15 @@ def peeling(arm: str) -> str:
     """Columns of one arm."""
     names = {"px": "x", "py": "y", "pz": "z", **{n: n for n in ("qx", "qy", "qz", "qw", *WRENCH.split(","))}}
     return ",".join(f"{name}={arm}_{column}" for name, column in names.items())
+
+
+def every_recording() -> dict[str, Demonstration]:
+    """Those of `recordings`, and an arm's motion without contact, its sensor calibrated by nothing."""
+    found, base = recordings(), recordings_dir()
+    if base is not None:
+        place = base / "kuka_ati"
+        found["kuka motion"] = read_demonstration(
+            place / "1-baseline_orientations.csv", wrench=place / "1-baseline_wrench.csv", units="us",
+            position="0,0,0", wrench_frame="tool", wrench_includes_tool_weight=True, zero_time=True,
+        )  # fmt: skip
+    return found

@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from skillframe_certify.surrogate import Surrogate
 
-from skillframe.campaign.claims.surrogate import Surrogate
 from skillframe.cli.main import run
 
 HELD_OUT = 512
@@ -60,7 +60,7 @@ ASKED = {
     "peg": Asked("peg_in_hole", 'coc = "tip"', 10.0, {
         "start.tilt_x": (-0.16, 0.16), "start.tilt_y": (-0.16, 0.16), "world.friction": (0.05, 0.5),
     }, (0.0, 0.0, 0.1)),
-    "valley": Asked("valley", "", 6.0, {
+    "valley": Asked("valley", 'set = { "start.offset_z" = 0.12 }', 15.0, {  # above the steepest flank
         "fixture.offset_x": (-0.03, 0.06), "fixture.tilt_y": (-0.9, 0.9),
     }, (0.0, 0.0)),
     "coupler": Asked("hose_coupler", 'coc = "tip"', 10.0, {
@@ -77,7 +77,7 @@ ASKED = {
 
 def taught(asked: Asked, folder: Path) -> None:
     """Two demonstrations of a simulated person, and the skill learned from them."""
-    demonstration = ["demonstration", "record", "--world", asked.world, "--count", "2", "--seed", "1"]
+    demonstration = ["record", "--world", asked.world, "--count", "2", "--seed", "1"]
     demonstration += ["--robot", asked.robot, "--teacher", asked.teacher]
     assert run([*demonstration, "--out", str(folder / "d.npz")]) == 0
     shown = [str(folder / f"d{i}.npz") for i in (1, 2)]
@@ -152,11 +152,11 @@ def main() -> None:
         if border.exists()
         else [str(campaign(asked, folder, "border", 1, 9, uniform)), "--out", str(border)]
     )
-    seconds = timed(folder, "map", ["campaign", "map", *go_on])
+    seconds = timed(folder, "map", ["certify", "map", *go_on])
     seen = rows_of(asked, border / "look" / "results.csv", *sorted(border.glob("border/*/results.csv")))
     count = len(seen[1])
     nominal = rows_nominal(asked)
-    predicted("campaign map", seen, (points, works), nominal, seconds)
+    predicted("certify map", seen, (points, works), nominal, seconds)
     beside = {"Sobol": (count, sobol), "random": (count, uniform)}
     side = round(count ** (1.0 / len(asked.ranges)))
     beside["grid"] = (side ** len(asked.ranges), lambda low, high: grid(low, high, side))
@@ -170,10 +170,10 @@ def main() -> None:
         claim = folder / f"claim{rate}"
         if not claim.exists():
             shutil.copytree(border, claim)
-        seconds = timed(folder, claim.name, ["campaign", "certify", str(claim), "--rate", str(rate)])
+        seconds = timed(folder, claim.name, ["certify", "run", str(claim), "--rate", str(rate)])
         found = json.loads((claim / "certificate.json").read_text())["predicate"]
         told(f"certify {rate}", found["certified"], found.get("box"), f"{seconds:.0f} s")
-    seconds = timed(folder, "break", ["campaign", "break", str(border)])
+    seconds = timed(folder, "break", ["certify", "find-failure", str(border)])
     told("break", (border / "breaking.json").read_text(), f"{seconds:.0f} s")
 
 
@@ -205,7 +205,7 @@ def repeated(asked: Asked, folder: Path, fresh: Tried, seeds: range) -> None:
     for seed in seeds:
         out, beside = folder / f"border{seed}", folder / f"sobol{seed}"
         path = campaign(asked, folder, out.name, 1, seed, uniform)
-        timed(folder, out.name, ["campaign", "map", *([str(out)] if out.exists() else [str(path), "--out", str(out)])])
+        timed(folder, out.name, ["certify", "map", *([str(out)] if out.exists() else [str(path), "--out", str(out)])])
         rounds = sorted(out.glob("border/*/results.csv"), key=lambda table: int(table.parent.name))
         seen = rows_of(asked, out / "look" / "results.csv", *rounds)
         path = campaign(asked, folder, beside.name, SEQUENCE, seed, sobol)

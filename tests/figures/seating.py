@@ -22,16 +22,26 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from skillframe_search.handling import HANDLING, Handling
+from skillframe_search.seat import build
 
 from skillframe import learn, record
 from skillframe.campaign.statistics import clopper_pearson
 from skillframe.demonstration.record import Demonstration
+from skillframe.document.frame import with_center
 from skillframe.execution.executor import simulate
 from skillframe.execution.prepare import load_robot_model, load_world, prepare
 from tests import part_meshes
 from tests.system.test_parts_how_to import plug_and_socket
 
 ROBOT, DURATION_S = "panda", 15.0
+ADDED = {
+    "- catch": {"catch_ns_m": 0.0},
+    "- upright": {"upright_nm_rad": 0.0},
+    "- rock": {"rock_nm": 0.0, "slow_nm": 0.0},
+    "- centre": {"centre_n": 0.0},
+}
+"""What a seating adds to its push, left out of the whole."""
 LEVELS = {"1 mm, 2 deg": (0.001, radians(2.0)), "2 mm, 5 deg": (0.002, radians(5.0))}
 FRICTIONS = (0.2, 0.5)
 DOWN = [0.0, 0.0, -1.0]
@@ -52,18 +62,11 @@ def documents(shown: Sequence[Demonstration]) -> dict[str, Document]:
         "push + spiral": _shipped(whole, alone),
         "LMC": alone,
         "LMC + search": whole,
-        "- search": _with_seat(whole, search=False),
+        "- search": _with_seat(whole, tries=0),
         "- direction": _edited(whole, _straight_down),
         "- compliance": _edited(whole, _stiff),
         "- learned push": _edited(whole, _by_hand),
         "- approach": _with_seat(whole, approach=False),
-        "- catch": _with_seat(whole, catch_ns_m=0.0),
-        "catch 1000 Ns/m": _with_seat(whole, catch_ns_m=1000.0),
-        "- lean": _with_seat(whole, lean_nm_rad=0.0, upright_nm_rad=0.0),
-        "- rock": _with_seat(whole, rock_nm=0.0, slow_nm=0.0),
-        "- keep": _with_seat(whole, keep_n_m=0.0),
-        "- follow": _with_seat(whole, follow_s=0.0),
-        "- centre": _with_seat(whole, centre_n=0.0),
     }
     return made
 
@@ -102,12 +105,8 @@ def _pushed(document: Document, phase: Document) -> Document:
 
 
 def _shipped(whole: Document, alone: Document) -> Document:
-    """The hand-written push, and on a stall the spiral that shipped before: 10 N, 2000 N/m, pitch 1.6 mm, as it was."""
-    result = _with_seat(
-        whole, approach=False, catch_ns_m=0.0, lean_nm_rad=0.0, upright_nm_rad=0.0, rock_nm=0.0, slow_nm=0.0,
-        keep_n_m=0.0, follow_s=0.0, lost_m=1.0, patience_s=100.0, stall_s=100.0, sunk_m=1.0,
-    )  # fmt: skip
-    result = deepcopy(result)
+    """The hand-written push, and on a stall the spiral that shipped before: 10 N, 2000 N/m, pitch 1.6 mm."""
+    result = deepcopy(_with_seat(whole, approach=False, settle_s=0.0))
     _by_hand(result["phases"][0])
     spiral = result["phases"][1]
     spiral["push"]["force"] = 10.0
@@ -128,10 +127,14 @@ def draws_of(level: str, friction: float, count: int, seed: int) -> dict[str, An
     return drawn | {"world.friction": np.full(count, friction)}
 
 
-def cell(world: str, document: Document, level: str, friction: float, count: int, seed: int) -> dict[str, Any]:
+def cell(
+    world: str, document: Document, how: Handling, level: str, friction: float, count: int, seed: int
+) -> dict[str, Any]:
     """What became of each trial of one method at one level and friction."""
     scene = load_world(world, {})
     skill, setup = prepare(load_robot_model(ROBOT), scene, document, "tip")
+    if document["type"] == "seat":
+        skill = build(with_center(document, setup.center_of_compliance.tolist()), how)
     setup = replace(setup, stop_when=scene.goal)
     rngs = [np.random.default_rng([seed, 7, i]) for i in range(count)]
     result = simulate(skill, setup, draws_of(level, friction, count, seed), rngs, duration_s=DURATION_S)
@@ -171,8 +174,10 @@ def main(given: Sequence[str]) -> None:
             for level in args.levels:
                 for friction in args.frictions:
                     print(f"\n{name}, {level}, friction {friction:g}", flush=True)
-                    for method in args.methods or made:
-                        found = cell(world, made[method], level, friction, args.trials, args.seed)
+                    for method in args.methods or [*made, *ADDED]:
+                        document = made["LMC + search" if method in ADDED else method]
+                        how = replace(HANDLING, **ADDED.get(method, {}))
+                        found = cell(world, document, how, level, friction, args.trials, args.seed)
                         print(line(method, found), flush=True)
                         print(json.dumps([name, level, friction, method, found]), file=sys.stderr, flush=True)
 

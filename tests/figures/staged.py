@@ -10,12 +10,12 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
+from skillframe_teaching.sessions import record
+from skillframe_teaching.teacher import TeacherSettings
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.execution.prepare import load_robot_model, load_world
 from skillframe.frames import Float, matrix_from_quaternion, rotation_vector
-from skillframe.teaching.sessions import record
-from skillframe.teaching.teacher import TeacherSettings
 
 MOVED_M, TURNED_RAD = 1e-3, float(np.deg2rad(1.0))
 

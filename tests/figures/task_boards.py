@@ -28,10 +28,15 @@ from scipy.stats import binomtest
 from skillframe_segmenter.document import read
 from skillframe_segmenter.placed import WORK, Placed, Placement, placement_of
 from skillframe_segmenter.policy import Policy
+from skillframe_teaching.sessions import record
+from skillframe_teaching.teacher import TeacherSettings
+from skillframe_worlds.task_board import PLACES as BOARD
+from skillframe_worlds.task_board import done_in_order
 
-from skillframe.demonstration.places import KEY, as_plain
 from skillframe.demonstration.record import Demonstration
-from skillframe.document.source import learned
+from skillframe.document.file import learned
+from skillframe.document.frame import PLACES as KEY
+from skillframe.document.frame import as_plain
 from skillframe.errors import SkillframeError
 from skillframe.execution.executor import simulate
 from skillframe.execution.prepare import load_robot_model, load_world, prepare
@@ -39,14 +44,10 @@ from skillframe.execution.trace import Trace
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, norm, rotate, rotate_spatial
-from skillframe.sequence import Part
+from skillframe.sequence import Moved, Part
 from skillframe.skill import Skill
-from skillframe.teaching.sessions import record
-from skillframe.teaching.teacher import TeacherSettings
 from skillframe.world.placement import fixture_poses, places_in_base
 from skillframe.world.scene import Scene
-from skillframe.world.worlds.task_board import PLACES as BOARD
-from skillframe.world.worlds.task_board import done_in_order
 
 LAYOUTS, EACH = (1, 2, 3), 3
 COUNTS = {"policies": 3, "boards": 6, "seed": 9100}  # of a layout, of a policy, and what all is drawn from
@@ -124,7 +125,7 @@ def told(document: Document, places: Mapping[str, Pose]) -> Told:
     known, phases = read(document), dict[int, Watched]()
 
     def watched(i: int, placement: Placement, make: Callable[[], Skill]) -> Skill:
-        return phases.setdefault(i, Watched(placement, make))
+        return Moved(lambda: phases.setdefault(i, Watched(placement, make)), placement.pose)
 
     parts = []
     for i, sub in enumerate(known.skills):

@@ -5,15 +5,15 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from skillframe_teaching.sessions import record
+from skillframe_teaching.teacher import TeacherSettings
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.execution.prepare import load_robot_model, load_world
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import Float
-from skillframe.teaching.sessions import record
-from skillframe.teaching.teacher import TeacherSettings
-from skillframe.world.sensors import SensorSettings
+from skillframe.world.quantities import SensorSettings
 
 SEED = 20261121
 PAIRS = 20

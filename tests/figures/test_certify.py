@@ -7,12 +7,12 @@ axes and softness are drawn, or about two of them; q up to 7 % is a failure that
 import numpy as np
 import pytest
 from scipy.stats import qmc
+from skillframe_certify.box import Box, peel
+from skillframe_certify.claim import certified, family, fresh_trials, judge, passes
+from skillframe_certify.engine import Looked
+from skillframe_certify.procedure import SLACK, propose
+from skillframe_certify.question import LOOKS, Question
 
-from skillframe.campaign.claims.box import Box, peel
-from skillframe.campaign.claims.claim import certified, family, fresh_trials, judge, passes
-from skillframe.campaign.claims.engine import Looked
-from skillframe.campaign.claims.procedure import SLACK, propose
-from skillframe.campaign.claims.question import LOOKS, Question
 from skillframe.campaign.statistics import clopper_pearson
 from tests.figures.teaching import row
 

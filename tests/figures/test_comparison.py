@@ -4,8 +4,8 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from skillframe_certify.compare import Evidence, holm_of_minima
 
-from skillframe.campaign.claims.compare import Evidence, holm_of_minima
 from skillframe.campaign.race import Race
 from skillframe.campaign.spec import RaceKeys
 from skillframe.campaign.statistics import clopper_pearson

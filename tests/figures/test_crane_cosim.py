@@ -7,7 +7,7 @@ the differences hold everything: the coupling, MuJoCo's integrator and constrain
 import numpy as np
 import pytest
 
-from skillframe.fmu.toolchain import find_compiler
+from skillframe.fmu.build import find_compiler
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.laws.crane_monolith import Monolith
 from tests.laws.crane_plants import START, ChainPlant, History, coupled, crane, cylinders, simulated, tooled, waves

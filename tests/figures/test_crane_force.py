@@ -12,9 +12,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+from skillframe_hydraulics.force.identification import IdentificationSettings
+from skillframe_hydraulics.force.momentum import ForceSettings
 
-from skillframe.machine.force.identification import IdentificationSettings
-from skillframe.machine.force.momentum import ForceSettings
 from tests.crane_press import AIR, DAMPING, DT, LANDED, Press, crane, cylinders, replay
 from tests.crane_scores import case, root_mean_square, score, window
 from tests.figures.teaching import row
@@ -54,7 +54,7 @@ def augmented(log, told):
     count = log.force.shape[1]
     estimator = ForceEstimator(crane(), cylinders(), count, DT, PARTS[NOMINAL])
     filters = [AugmentedForceFilter(3, AugmentedSettings(told=told)) for _ in range(count)]
-    smooth, force, found = force_filter(FULL.feedback_corner, DT), np.zeros((count, 2)), []
+    smooth, force, found = force_filter(FULL.feedback_corner, DT, 2), np.zeros((count, 2)), []
 
     class Watched:
         def __getattr__(self, name):

@@ -8,10 +8,10 @@ from functools import cache
 
 import numpy as np
 import pytest
+from skillframe_hydraulics.law.hydraulic import HydraulicGains
 from skillframe_papers.rows import crane_runs
 
-from skillframe.fmu.toolchain import find_compiler
-from skillframe.machine.law.hydraulic import HydraulicGains
+from skillframe.fmu.build import find_compiler
 from tests.figures.crane_contact import ENCODER, precise, pressed, true_path
 from tests.figures.crane_motion import DT, Truth, figures, run
 from tests.figures.crane_rivals import FORCE, TUNED, Rivals, Vdc

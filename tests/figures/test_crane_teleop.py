@@ -11,12 +11,12 @@ from math import radians
 
 import numpy as np
 import pytest
+from skillframe_hydraulics import teleoperation
+from skillframe_hydraulics.sessions import aimed, operate
+from skillframe_hydraulics.teleoperation import OperatorSettings, loop_gain
 
 from skillframe.errors import InputError
 from skillframe.execution.prepare import load_robot_model, load_world
-from skillframe.teaching import teleoperation
-from skillframe.teaching.machine_sessions import aimed, operate
-from skillframe.teaching.teleoperation import OperatorSettings, loop_gain
 from tests.crane_corner import PEAK, into_the_corner
 from tests.crane_teaching import Taught, angle_of, draws, estimate_error, learn, margin, teach
 from tests.figures.teaching import row

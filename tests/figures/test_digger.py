@@ -1,7 +1,7 @@
 """A digger of 1.5 t by own-crane.md, gains derived from its figures: of 200 landings on wood none bounces.
 
 Friction +-20 %, masses +-2 %, starts +-0.1 m, sensors' noise. With the gains of the crane that ships the same digger
-swings by itself (tests/unit/machine/test_gains.py, tests/unit/machine/test_ringing.py).
+swings by itself (plugins/hydraulics/tests/test_gains.py, plugins/hydraulics/tests/test_ringing.py).
 """
 
 import numpy as np

@@ -9,10 +9,10 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from skillframe_reports.results import Results, read_results
 
+from skillframe.cli.demo import TASKS
 from skillframe.cli.main import run
-from skillframe.cli.quickstart import TASKS
-from skillframe.reports.results import Results, read_results
 from skillframe.robot.spec import robot_names
 from tests.figures.teaching import row
 
@@ -46,7 +46,7 @@ def proved(folder: Path, name: str, template: str, scale: float) -> Results:
 def test_weaker_motors_fail_by_name_and_the_sound_arms_utilisation_stands_in_the_report(
     tmp_path: Path, name: str, world: str, template: str, coc: str | None
 ) -> None:
-    record = ["demonstration", "record", "--world", world, "--robot", "panda", "--count", "2", "--seed", "1"]
+    record = ["record", "--world", world, "--robot", "panda", "--count", "2", "--seed", "1"]
     assert run([*record, "--out", str(tmp_path / f"{name}.npz")]) == 0
     demos = [str(tmp_path / f"{name}{i}.npz") for i in (1, 2)]
     assert run(["learn", *demos, "--out", str(tmp_path / f"{name}.skill.json")]) == 0
@@ -73,5 +73,5 @@ def test_weaker_motors_fail_by_name_and_the_sound_arms_utilisation_stands_in_the
     page = tmp_path / f"{name}.html"
     assert run(["report", str(tmp_path / f"{name}_1"), "--out", str(page)]) == 0
     text = page.read_text(encoding="utf-8")
-    assert "What the motors were asked for" in text
+    assert "Load of the motors" in text
     assert f"<td>{100 * worst[1.0]:.0f} %</td>" in re.sub(r"<td[^>]*>", "<td>", text)

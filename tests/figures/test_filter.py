@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.stats import binom
+from skillframe_recordings.conditioning.offline import filter_wrench, smooth
 
-from skillframe.conditioning.offline import filter_wrench, smooth
 from skillframe.frames import Float
-from skillframe.world.sensors import SensorSettings
+from skillframe.world.quantities import SensorSettings
 from tests.figures.teaching import DOWN, angle_deg, phases, row, taught
 
 pytestmark = [pytest.mark.figures, pytest.mark.needs_plugins]

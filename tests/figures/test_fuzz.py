@@ -39,6 +39,7 @@ def fuzz(count: int, seed: str, folder: Path) -> subprocess.CompletedProcess[str
 @pytest.mark.slow
 @pytest.mark.needs_plugins
 @pytest.mark.skipif(sys.platform != "linux", reason="forks and /proc are needed")
+@pytest.mark.figures
 def test_a_few_hundred_damaged_inputs_are_answered_with_0_1_or_2(tmp_path: Path) -> None:
     ended = fuzz(200, "everyday", tmp_path)
     assert ended.returncode == 0, ended.stdout[-6000:] + ended.stderr[-2000:]
@@ -56,6 +57,7 @@ def test_twenty_thousand_damaged_inputs_of_a_new_seed_are_answered_with_0_1_or_2
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="forks and /proc are needed")
+@pytest.mark.slow
 def test_the_fuzzer_sees_what_it_is_made_to_see(tmp_path: Path) -> None:
     """A command that breaks each promise in turn: each is found and named."""
     from tests.oracle import fuzz as oracle

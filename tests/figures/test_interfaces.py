@@ -1,6 +1,6 @@
 """Peg and valley by position and velocity, beside ideal torques, on two arms; the least damping in the valley.
 
-`pytest -m figures -s tests/figures/test_interfaces.py -k ur5e` makes the table of docs/how-to/interfaces.md.
+`pytest -m figures -s tests/figures/test_interfaces.py -k ur5e` prints the rows that docs/how-to/own-robot.md quotes.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest, qmc
 
-from skillframe.document.source import learned
+from skillframe.document.file import learned
 from skillframe.execution.drives.torque import TARED_IN_CONTACT
 from skillframe.execution.executor import Result, Setup, begin, simulate
 from skillframe.execution.prepare import load_robot_model, load_world, prepare
@@ -20,7 +20,7 @@ from skillframe.extend.records import Document, LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import Float, norm
 from skillframe.robot.interface import VIRTUAL_MASS, Control
-from skillframe.robot.mount import Mount
+from skillframe.robot.tables import Mount
 from skillframe.skill import Skill
 from tests.figures.teaching import row, taught
 
@@ -36,7 +36,7 @@ UR5E = {
     "position, 125 Hz, 20 ms": (replace(KINDS["position, 125 Hz, 20 ms"], contact_stiffness=4e4), 32, 18.0),
     "ur5e_velocity": ("ur5e_velocity", 32, 12.0),
     "torque": (Control(), 32, 12.0),
-    "ur5e_position": ("ur5e_position", 32, 20.0),
+    "ur5e": ("ur5e", 32, 20.0),
 }
 """Interface or robot, draws of the peg, and the median time that the design calls reachable [s]."""
 VARIED = {
@@ -114,7 +114,7 @@ def test_a_ur5e_by_position_or_velocity_does_peg_and_valley(world, name):
     """The design's figures: 61 of 64, 30 of 32, which exclude 0.86 and 0.79 with 95 %. Times are told."""
     given, count, median = UR5E[name]
     control = load_robot_model(given).spec.control if isinstance(given, str) else given
-    result = run(world, control, count if world == "peg_in_hole" else 64, arm="ur5e")
+    result = run(world, control, count if world == "peg_in_hole" else 64, arm="ur5e_torque")
     told(f"ur5e, {world}, {name}, median asked for {median if world == 'peg_in_hole' else 10.0:g} s", result)
     if name == "torque":
         return  # the reference, whose failures are told
@@ -126,7 +126,7 @@ def test_a_ur5e_by_position_or_velocity_does_peg_and_valley(world, name):
 def test_through_a_soft_mount_a_ur5e_by_position_does_the_peg_faster_and_softer(turning):
     """The prototype's mount of 2e4 N/m and 200 Nm/rad, 1.4e4 N/m in series with 4e4. Of 32 draws 30, as above."""
     control = replace(KINDS["position, 500 Hz, 8 ms"], contact_stiffness=1.4e4, contact_turning_stiffness=turning)
-    result = run("peg_in_hole", control, 32, arm="ur5e", mount=Mount(stiffness=2e4, turning_stiffness=200.0))
+    result = run("peg_in_hole", control, 32, arm="ur5e_torque", mount=Mount(stiffness=2e4, turning_stiffness=200.0))
     told(f"ur5e, peg_in_hole, soft mount, turning stiffness {turning}", result)
     assert result.success.sum() >= 30
     assert np.percentile(result.peak_force_n, 95) <= 70.0
@@ -137,7 +137,7 @@ def test_through_a_soft_mount_a_ur5e_by_position_does_the_peg_faster_and_softer(
 @pytest.mark.parametrize("name", ["torque", "position, 500 Hz, 8 ms"])
 def test_a_tare_in_contact_is_named_and_no_other(name, world, lower):
     """What the tare leaves of the bias tells: noise leaves 0.03 N an axis, contact its own force. 256 starts each."""
-    runs, setup = set_up(world, KINDS[name], "ur5e")
+    runs, setup = set_up(world, KINDS[name], "ur5e_torque")
     fixed, draws = drawn(world, 256)
     start = fixed["start.offset_z"] - (0.04 if world == "valley" and lower else 0.0)
     draws["start.offset_z"] = np.full(256, start - lower)

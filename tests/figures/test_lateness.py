@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from skillframe_recordings.lateness import lateness
 
-from skillframe.conditioning.lateness import lateness
+from plugins.recordings.tests.test_lateness import late, recorded
 from skillframe.demonstration.record import Demonstration
 from tests.figures.recorded import recordings
-from tests.unit.conditioning.test_lateness import late, recorded
 
 pytestmark = pytest.mark.figures
 SEEDS = 20

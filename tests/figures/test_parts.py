@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from skillframe_parts.field import error_of, surface_of
+from skillframe_parts.pieces import pieces_of
+from skillframe_parts.solid import arrays_of, solid_of
 
-from skillframe.parts.field import error_of, surface_of
-from skillframe.parts.pieces import pieces_of
-from skillframe.parts.solid import arrays_of, solid_of
 from skillframe.world.scene import Geom
 from tests import part_meshes
 from tests.laws.pushing import Push

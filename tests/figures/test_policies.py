@@ -15,14 +15,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from scipy.stats import binomtest
+from skillframe_teaching.sessions import record
+from skillframe_teaching.teacher import TeacherSettings
 
-from skillframe.document.source import learned
+from skillframe.document.file import learned
 from skillframe.execution.executor import Result, simulate
 from skillframe.execution.prepare import load_robot_model, load_world, prepare
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.extend.registry import registry
-from skillframe.teaching.sessions import record
-from skillframe.teaching.teacher import TeacherSettings
 
 pytestmark = [pytest.mark.needs_plugins]
 POLICIES, STARTS, EACH = 6, 9, 3
@@ -138,6 +138,7 @@ def test_policies_learned_with_a_free_tool_run_on_an_arm(name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", TASKS)
+@pytest.mark.figures
 def test_a_policy_from_whole_demonstrations_does_the_whole_task(name):
     result = executed(taught(TASKS[name], SHORT_SEED), TASKS[name], 6, SHORT_SEED, TASKS[name].center)
     assert result.success.sum() >= 5  # a share of 0.9, which the figures show to be exceeded, gives 5 or 6 of 6 in 89 %

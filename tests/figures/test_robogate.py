@@ -11,10 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.stats import rankdata
-
-from skillframe.campaign.claims.compare import compare
-from skillframe.campaign.claims.surrogate import Surrogate
-from skillframe.campaign.claims.trials import read_trials
+from skillframe_certify.compare import compare
+from skillframe_certify.surrogate import Surrogate
+from skillframe_certify.trials import read_trials
 
 FOLDER = os.environ.get("SKILLFRAME_ROBOGATE")
 OUTCOMES = ("sample_idx", "success", "cycle_time", "dist_to_target")

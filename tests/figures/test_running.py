@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
-from skillframe.document.source import learned
+from skillframe.document.file import learned
 from skillframe.execution.executor import Result, simulate
 from skillframe.execution.prepare import load_robot_model, load_world, prepare
 from skillframe.extend.records import Document, LearnOptions

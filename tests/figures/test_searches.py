@@ -10,11 +10,11 @@ from itertools import islice
 import numpy as np
 import pytest
 from scipy.stats import qmc
+from skillframe_certify import border, breaking_point, sensitivity
+from skillframe_certify.engine import Looked
+from skillframe_certify.question import LOOKS
+from skillframe_certify.surrogate import Surrogate
 
-from skillframe.campaign.claims import border, breaking, matter
-from skillframe.campaign.claims.engine import Looked
-from skillframe.campaign.claims.question import LOOKS
-from skillframe.campaign.claims.surrogate import Surrogate
 from tests.figures.teaching import row
 from tests.figures.test_certify import Truth
 
@@ -162,7 +162,7 @@ def broken(kind, dimension, seed, degrees=None):
     truth, least = kind(rng, dimension) if degrees is None else kind(rng, dimension, 1.0 / np.tan(np.radians(degrees)))
     seen = sobol(dimension, seed)[: LOOKS[dimension]]
     tried = [seen]
-    search = breaking.search(Looked(seen, truth(seen)), np.zeros(dimension), breaking.BUDGET[dimension])
+    search = breaking_point.search(Looked(seen, truth(seen)), np.zeros(dimension), breaking_point.BUDGET[dimension])
     try:
         batch = next(search)
         while True:
@@ -198,7 +198,7 @@ BROKEN = range(300, 360)
 def test_a_breaking_point_is_within_a_tenth_of_the_smallest_in_fourteen_of_fifteen(kind, dimension):
     met, near = told(kind.__name__, dimension, [broken(kind, dimension, seed) for seed in BROKEN])
     if kind is dent and dimension > 4:  # fails in 0.2 and 0.07 % of all directions: that one is met is luck
-        chance = covered(ways(dimension, breaking.BUDGET[dimension] - 64), axes(dimension, 30_000, 1)).mean()
+        chance = covered(ways(dimension, breaking_point.BUDGET[dimension] - 64), axes(dimension, 30_000, 1)).mean()
         assert met >= len(BROKEN) * chance - 2.0 * np.sqrt(len(BROKEN) * chance * (1.0 - chance))
         assert near >= 0.9 * met
     else:
@@ -219,12 +219,12 @@ def axes(dimension, count, seed):
 
 
 def ways(dimension, count):
-    return np.array(list(islice(breaking.spread(np.zeros(dimension)), count)))
+    return np.array(list(islice(breaking_point.spread(np.zeros(dimension)), count)))
 
 
 def fails_up_to(directions, slope=2.0, tip=0.4):
     """Cosine of the angle t to its axis up to which a dent is met at a ray's end R: cos t - slope sin t = tip / R."""
-    ends = breaking.reach(np.zeros(directions.shape[1]), directions)
+    ends = breaking_point.reach(np.zeros(directions.shape[1]), directions)
     return np.cos(np.arccos(tip / ends / np.hypot(1.0, slope)) - np.arctan(slope))
 
 
@@ -258,7 +258,7 @@ def test_ways_meet_almost_as_many_narrow_dents_as_ways_chosen_for_them(dimension
     """Chosen greedily for the very dent, by axes that are not those that judge."""
     about, count = axes(dimension, 40_000, 2), 1024
     best = known_best(axes(dimension, 12_000, 3), axes(dimension, 200_000, 4), count)
-    designs = best, ways(dimension, count), breaking.directions(dimension)[:count]
+    designs = best, ways(dimension, count), breaking_point.directions(dimension)[:count]
     chosen, ours, even = (covered(design, about).mean() for design in designs)
     row(f"{count} ways, {dimension}-D", f"meet {ours:.3f}, Sobol {even:.3f}", f"chosen for the dent {chosen:.3f}")
     assert 1.0 - ours < 0.8 * (1.0 - even)
@@ -280,7 +280,7 @@ def test_the_quantities_that_matter_rank_before_the_one_that_does_not(name):
         hits = 0
         for seed in range(10):
             points = sobol(4, seed)[:trials]
-            found = matter.indices(Surrogate(points, truth(points)), 4)
+            found = sensitivity.indices(Surrogate(points, truth(points)), 4)
             hits += set(np.argsort(-found)[: len(right)].tolist()) == right
         row(f"{name}, {trials} trials", f"{hits} of 10 seeds right")
         assert hits >= 8 or trials < 512

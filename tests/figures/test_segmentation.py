@@ -21,11 +21,11 @@ from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
 from skillframe.extend.reading import read_demonstration
 from skillframe.frames import Float
-from skillframe.paths import recordings_dir
 from tests.figures import quasistatic as made
 from tests.figures import staged
 from tests.figures.phase_baselines import BASELINES
 from tests.figures.phases import NOTHING, Interval, Score, one_story, phases_of, policy, score
+from tests.references import recordings_dir
 
 pytestmark = [pytest.mark.figures, pytest.mark.needs_plugins]
 TOUCH_N, TOUCHED_S = 1.5, 0.40

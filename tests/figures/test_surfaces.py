@@ -4,7 +4,7 @@
 
 5.9 kg is what the tool point of the UR5e at home has along the tool while it may not turn, motors included. The servo
 gives way by 5.9 kg (2 pi 30 Hz)^2 = 2.1e5 N/m. `pytest -m figures -s tests/figures/test_surfaces.py` makes the tables
-of docs/how-to/interfaces.md.
+whose figures docs/how-to/own-robot.md names.
 """
 
 from __future__ import annotations
@@ -15,13 +15,12 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
-from skillframe.control.admittance import AdmittanceLaw, Bounds
-from skillframe.control.inner_loop import InnerLoop
-from skillframe.control.ringing import RingWatch
+from skillframe.control.admittance import AdmittanceLaw, Bounds, RingWatch
+from skillframe.control.motors import InnerLoop
 from skillframe.frames import Float, Pose
 from skillframe.robot.interface import SERVO, TAUGHT_SPEED, Control
 from skillframe.robot.spec import load_robot
-from skillframe.signals.kalman import WrenchFilter
+from skillframe.signals import WrenchFilter
 from skillframe.skill import Command, Impedance, no_reasons
 from tests.figures.teaching import row
 
@@ -29,7 +28,7 @@ pytestmark = pytest.mark.figures
 MASS, SPRING, TICK, PARTS = 5.9, 1000.0, 1e-3, 10
 SURFACES = (1e4, 3e4, 1e5, 3e5, 1e6)
 LATE = {
-    "500 Hz, 45 ms": load_robot("ur5e_position").control,
+    "500 Hz, 45 ms": load_robot("ur5e").control,
     "125 Hz, 52 ms": Control(interface="position", rate_hz=125.0, delay_s=0.02),
 }
 

@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 from skillframe_benchmarks.assembly import DONE, TRIALS, by_level
+from skillframe_parts.declared import read_fixture
+from skillframe_parts.fit import TOUCH, PartsFit, fit, thickness
+from skillframe_parts.solid import read_part
 
 from skillframe.errors import InputError
 from skillframe.frames import Float, rotation_matrix
-from skillframe.parts.declared import read_fixture
-from skillframe.parts.fit import TOUCH, PartsFit, fit, thickness
-from skillframe.parts.solid import read_part
 
 RAISED_M, FURTHER_M, LEAST_M, MOST_M = 3e-4, 5e-4, 2e-3, 3e-3
 DIRECTIONS = np.radians(np.arange(0.0, 180.0, 10.0))

@@ -9,16 +9,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from skillframe_recordings.lateness import RATE, SPAN, lateness_shares
+from skillframe_recordings.orientation_doubts import point_residual, rms, turned
 
-from skillframe.conditioning.lateness import RATE, SPAN, lateness_shares
-from skillframe.demonstration.attitude_doubts import point_residual, rms, turned
-from skillframe.demonstration.contradiction import work_cosine
+from skillframe.demonstration.checks import work_cosine
 from skillframe.demonstration.record import Demonstration
 from skillframe.frames import Float, matrix_from_quaternion, norm, rotate
 from tests.figures.recorded import recordings
 
 STEP, LEAST_STEP = 0.05, 2e-4  # s, m: directions of motion
-LEAST_FORCE, STRONG = 1.0, 0.2  # N, share of the 95 % quantile: contact, as `attitude_doubts` takes it
+LEAST_FORCE, STRONG = 1.0, 0.2  # N, share of the 95 % quantile: contact, as `orientation_doubts` takes it
 
 
 class Shown(NamedTuple):

@@ -1,4 +1,4 @@
-"""Tasks in which averages of a demonstration do not work: LMC by contact modes beside its nulls, set by set.
+"""Tasks in which averages of a demonstration do not work: LMC beside its nulls, set by set.
 
     python -m tests.figures.worth hump_low --sets 20 --first 9000
     python -m tests.figures.worth all --sets 20 --first 9600 --workers 2 --out sets.jsonl
@@ -55,10 +55,7 @@ def rows_of_set(
             rows |= {f"{kind}|{n}": r for n, r in played(given, PLAYED, rows[f"{kind}|LMC"].stiffness).items()}
         for count in (1, 2) if kind == FEW else ():
             few = pushes(given[:count])
-            rows |= {
-                f"{kind}, {count} shown|{name}": few[name]
-                for name in ("LMC", "LMC, deepest push", "bisector", "bisector, unit force")
-            }
+            rows |= {f"{kind}, {count} shown|{name}": few[name] for name in ("LMC", "bisector", "bisector, unit force")}
     return rows
 
 
@@ -97,11 +94,11 @@ def directions(seed: int, family: str, kinds: Sequence[str]) -> list[str]:
     low = np.degrees(np.arctan(scene.friction))
     high, lines = 90.0 - low - np.degrees(scene.params["slope"]), []
     for kind, shown in demonstrations(scene, turn, rng, kinds, EACH, FLOORS.get(family, SHORT))[0].items():
-        for name, row in (("LMC", lmc_row(shown)), ("LMC, old rule", lmc_row(shown, contact_modes=False))):
-            x, _, z = turn.T @ row.push
-            below = np.degrees(np.arctan2(-z, x)) if row.push.any() else np.nan
-            said = "passes" if low < below < high else "does not"
-            lines.append(f"{seed} {kind:12} {name:14} {below:5.1f} in {low:.1f} to {high:.1f}: {said}")
+        push = lmc_row(shown).push
+        x, _, z = turn.T @ push
+        below = np.degrees(np.arctan2(-z, x)) if push.any() else np.nan
+        said = "passes" if low < below < high else "does not"
+        lines.append(f"{seed} {kind:12} {below:5.1f} in {low:.1f} to {high:.1f}: {said}")
     return lines
 
 

@@ -7,14 +7,14 @@ from math import radians
 from typing import Any
 
 import numpy as np
+from skillframe_teaching.people import People, Person, off_by
+from skillframe_teaching.sessions import demonstration_from
+from skillframe_teaching.teacher import TeacherSettings
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.execution.executor import Setup, simulate
 from skillframe.execution.prepare import load_robot_model, load_world
 from skillframe.frames import Float, rotation_matrix, unit
-from skillframe.teaching.people import People, Person, off_by
-from skillframe.teaching.sessions import demonstration_from
-from skillframe.teaching.teacher import TeacherSettings
 from skillframe.world.placement import fixture_poses
 from skillframe.world.scene import Scene
 

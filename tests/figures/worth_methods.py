@@ -15,7 +15,7 @@ from skillframe_lmc.sectors import sectors
 from skillframe_lmc.settings import Settings
 
 from skillframe.demonstration.record import Demonstration
-from skillframe.document.source import learned as learned_as
+from skillframe.document.file import learned as learned_as
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import Float, norm, unit
@@ -38,8 +38,7 @@ BLEND: dict[str, dict[str, Any]] = {
 def pushes(shown: Sequence[Demonstration]) -> dict[str, Row]:
     """LMC and the averages."""
     lmc = lmc_row(shown)
-    deepest = lmc_row(shown, expected=False)
-    rows = {"LMC": lmc, "LMC, free across": push_along(lmc.push), "LMC, deepest push": deepest}
+    rows = {"LMC": lmc, "LMC, free across": push_along(lmc.push)}
     return rows | {name: push_along(given) for name, given in averages(shown).items()}
 
 

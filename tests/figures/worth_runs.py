@@ -11,32 +11,46 @@ from skillframe.campaign.statistics import clopper_pearson
 from skillframe.execution.executor import Setup, simulate
 from skillframe.execution.prepare import load_robot_model
 from skillframe.frames import Float
+from skillframe.skill import Ended
 from skillframe.world.scene import Scene
 from tests.figures.worth_families import SHORT, starts
 from tests.figures.worth_skills import LONGEST, Row, Rows
 
 EACH, MOVED, ENOUGH = 3, 5, 4
+INSIDE = Ended.START.value
 
 
 def executed(
     scene: Scene, rows: dict[str, Row], turn: Float, rng: np.random.Generator, seed: int, longest: float = LONGEST,
     floors: Sequence[float] = SHORT,
 ) -> Any:  # fmt: skip
-    """Whether each method's moved runs, and its run in place, reached the goal: lists by key."""
+    """Whether each method's moved runs, and its run in place, reached the goal: lists by key.
+
+    A start inside the fixture is no trial, so it is drawn again, before any method has run.
+    """
+    setup = Setup(robot=load_robot_model("free_tool"), scene=scene,
+                  center_of_compliance=np.array(scene.tool.frames["tip"]))  # fmt: skip
+    noise = np.random.default_rng([seed, 1]).spawn((MOVED + 1) * len(rows))
+    draws = _draws(scene, turn, rng, floors)
+    still = Rows([Row()] * (MOVED + 1))
+    while (inside := simulate(still, setup, draws, noise[: MOVED + 1], duration_s=0.002).ended_by == INSIDE).any():
+        again = _draws(scene, turn, rng, floors)
+        draws = {key: np.where(inside, again[key], values) for key, values in draws.items()}
+    tiled = {key: np.tile(values, len(rows)) for key, values in draws.items()}
+    each = [row for row in rows.values() for _ in range(MOVED + 1)]
+    good = simulate(Rows(each), setup, tiled, noise, duration_s=longest).success.reshape(-1, MOVED + 1)
+    return {key: done.tolist() for key, done in zip(rows, good, strict=True)}
+
+
+def _draws(scene: Scene, turn: Float, rng: np.random.Generator, floors: Sequence[float]) -> dict[str, Float]:
+    """Starts, poses of the fixture and friction of the moved runs, and of the one in place."""
     count = MOVED + 1
-    moved = np.arange(count) < MOVED
+    moved = (np.arange(count) < MOVED).astype(float)
     offsets = starts(scene, turn, rng, count, 0.003, floors)
     draws = {f"start.offset_{a}": offsets[:, i] for i, a in enumerate("xyz")}
     draws |= {f"fixture.offset_{a}": moved * rng.uniform(-0.002, 0.002, count) for a in "xyz"}
     draws |= {f"fixture.tilt_{a}": moved * np.radians(rng.uniform(-2.0, 2.0, count)) for a in "xyz"}
-    draws["world.friction"] = scene.friction * np.where(moved, rng.uniform(0.8, 1.2, count), 1.0)
-    setup = Setup(robot=load_robot_model("free_tool"), scene=scene,
-                  center_of_compliance=np.array(scene.tool.frames["tip"]))  # fmt: skip
-    noise = [g for _ in rows for g in np.random.default_rng([seed, 1]).spawn(count)]
-    tiled = {key: np.tile(values, len(rows)) for key, values in draws.items()}
-    each = [row for row in rows.values() for _ in range(count)]
-    good = simulate(Rows(each), setup, tiled, noise, duration_s=longest).success.reshape(-1, count)
-    return {key: done.tolist() for key, done in zip(rows, good, strict=True)}
+    return draws | {"world.friction": scene.friction * np.where(moved > 0.0, rng.uniform(0.8, 1.2, count), 1.0)}
 
 
 def table(runs: Sequence[dict[str, Any]]) -> list[str]:
@@ -54,7 +68,7 @@ def table(runs: Sequence[dict[str, Any]]) -> list[str]:
     return lines
 
 
-NOT_NULLS = ("true push", "axis, push and turn", "LMC", "LMC, free across", "LMC, deepest push")
+NOT_NULLS = ("true push", "axis, push and turn", "LMC", "LMC, free across")
 """Rows that no null is: what is known to be right, and what LMC learned, with its rule before as an ablation."""
 
 

@@ -98,17 +98,19 @@ class Crane:
                     markerNumbers=markers, axisMarker0=[*along, 0.0], normalMarker1=[-along[1], along[0], 0.0]
                 )
             )
-        for c in self.chain.cylinders:
-            self._pin(c.piston, model.frames[c.eye].parentJoint, self.data.oMf[c.eye].translation[PLANE])
+        for loop in self.chain.loops:
+            one, other = (model.frames[frame].parentJoint for frame in loop.frames)
+            self._pin(other, one, self.data.oMf[loop.frames[0]].translation[PLANE])
 
     def _ends(self, index):
         """(joint, point) of both ends of a cylinder, and its length when the piston is in."""
         model = self.chain.model
-        for c in self.chain.cylinders:
-            if model.joints[c.piston].idx_v == self.chain.driven[index]:
-                rod_eye = self.data.oMf[c.rod_eye].translation[PLANE]
-                closed = np.linalg.norm(rod_eye - self._joint_at(c.barrel)) - self.start[self.chain.driven[index]]
-                return (c.barrel, self._joint_at(c.barrel)), (c.piston, rod_eye), closed
+        for _, rod in (loop.frames for loop in self.chain.loops):
+            slider = model.frames[rod].parentJoint
+            if model.joints[slider].idx_v == self.chain.driven[index]:
+                barrel, rod_eye = model.parents[slider], self.data.oMf[rod].translation[PLANE]
+                closed = np.linalg.norm(rod_eye - self._joint_at(barrel)) - self.start[self.chain.driven[index]]
+                return (barrel, self._joint_at(barrel)), (slider, rod_eye), closed
         joint = next(j for j in range(model.njoints) if model.joints[j].idx_v == self.chain.driven[index])
         here, along = self._joint_at(joint), self.slide(joint)
         behind = here - (1.0 + self.start[self.chain.driven[index]]) * along

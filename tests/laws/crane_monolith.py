@@ -10,13 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from skillframe_hydraulics.cylinder import equations as eq
 
-from skillframe.fmu.library import fmu_folders
+from skillframe.fmu.build import fmu_folders
 from skillframe.fmu.table import read_table, rows
-from skillframe.machine.cylinder import equations as eq
 from tests.laws.crane_plants import crane
 
-TOLERANCES = [1e-12] * 3 + [1e-11] * 3 + [1e-11] * 3 + [1e-9] * 3 + [1e-2] * 9 + [1e-14] * 3
+TOLERANCES = [1e-12] * 3 + [1e-11] * 3 + [1e-11] * 3 + [1e-9] * 3 + [1e-2] * 6 + [1e-14] * 3
 
 
 def parameters(cylinders):
@@ -66,43 +66,45 @@ class Monolith:
             extra = self.external(s)
             pins = float(s.v @ (self.chain.model.damping * s.v))
             bias = s.bias - (0.0 if extra is None else extra)
-            known = SimpleNamespace(mass=np.linalg.inv(s.mass), bias=bias, arms=s.arms, piston=s.piston, pins=pins)
+            known = SimpleNamespace(
+                mass=np.linalg.inv(s.mass), bias=bias, arms=s.arms, piston=s.driven_motion, pins=pins
+            )
             self._known = (key, known)
         return self._known[1]
 
     def rates(self, demand, y):
-        """Rates of the state (24,) under the commands that the spools follow (3,)."""
-        m, oil = self._mechanics(y), y[6:24].reshape(6, 3)
+        """Rates of the state (21,) under the commands that the spools follow (3,)."""
+        m, oil = self._mechanics(y), y[6:21].reshape(5, 3)
         x, v = m.piston
         force = eq.piston_force(self.p, oil, x, v)
         drive = m.mass @ (m.arms.T @ force - m.bias)
-        own = eq.rates(self.p, oil, eq.PistonMotion(x, v, demand, np.zeros(3)))
+        own = eq.rates(self.p, oil, eq.PistonMotion(x, v, demand))
         return np.concatenate([y[3:6], drive, own.ravel()])
 
     def powers(self, y):
         """Power [W]: what the lines bring less what they take, what leaks past the pistons, seals, pins."""
-        m, oil = self._mechanics(y), y[6:24].reshape(6, 3)
+        m, oil = self._mechanics(y), y[6:21].reshape(5, 3)
         x, v = m.piston
-        flows = eq.valve_flows(self.p, oil[0], oil[2], oil[3], oil[4], x)
+        flows = eq.valve_flows(self.p, oil[0], oil[2], oil[3], self.p.supply_pressure, x)
         a, b = (self._per_volume(oil[k]) + oil[k] for k in (2, 3))
         leaked = self.p.leakage * (oil[2] - oil[3]) * (a - b)
-        seals = eq.friction_force(self.p, oil[5], v) * v
+        seals = eq.friction_force(self.p, oil[4], v) * v
         return np.array([np.sum(flows.a * a + flows.b * b), np.sum(leaked), np.sum(seals), m.pins])
 
     def _per_volume(self, pressure):
-        """Elastic energy of oil of constant bulk modulus per volume (`eq.oil_energy` in closed form)."""
+        """Elastic energy of oil of constant bulk modulus per volume in closed form."""
         b = self.p.bulk_modulus
         return b * np.expm1(pressure / b) - pressure
 
     def energy(self, y):
-        s, oil = self.chain.at(y[:3], y[3:6]), y[6:24].reshape(6, 3)
-        x = s.piston[0]
+        s, oil = self.chain.at(y[:3], y[3:6]), y[6:21].reshape(5, 3)
+        x = s.driven_motion[0]
         volumes = self.p.dead_volume_a + self.p.area_a * x, self.p.dead_volume_b + self.p.area_b * (self.p.stroke - x)
         stored = sum(float(v @ self._per_volume(oil[k])) for v, k in zip(volumes, (2, 3), strict=True))
         return Energy(*s.energy(), stored)
 
     def follow(self, command, stop, tolerance=1e-9):
-        """State (24,) and integrated powers (4,) at the end of a run under smooth commands (a function of time)."""
+        """State (21,) and integrated powers (4,) at the end of a run under smooth commands (a function of time)."""
 
         def f(t, y):
             return np.concatenate([self.rates(command(t), y), self.powers(y)])
@@ -112,7 +114,7 @@ class Monolith:
         return solve_ivp(f, (0.0, stop), begin, method="Radau", rtol=tolerance, atol=atol, max_step=0.02).y[:, -1]
 
     def held(self, commands, hold, tolerance=1e-9):
-        """States at the end of every hold (T, 24), commands (T, 3) reached at the spool's slew from the last ones."""
+        """States at the end of every hold (T, 21), commands (T, 3) reached at the spool's slew from the last ones."""
         y, demand, history = self.y, np.zeros(3), []
         for u in np.asarray(commands):
             way = u - demand
@@ -130,5 +132,5 @@ class Monolith:
         return np.array(history)
 
     def pistons(self, states):
-        """(T, 3) of states (T, 24)."""
-        return np.array([self.chain.at(y[:3], y[3:6]).piston[0] for y in states])
+        """(T, 3) of states (T, 21)."""
+        return np.array([self.chain.at(y[:3], y[3:6]).driven_motion[0] for y in states])

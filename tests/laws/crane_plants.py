@@ -5,17 +5,19 @@ import math
 from functools import cache
 
 import numpy as np
+from skillframe_worlds.hooks import skillframe_worlds as world_types
 
 from skillframe.cosim import CosimSettings, Master, Motion
-from skillframe.execution.drives.coupled import CoupledPlant
-from skillframe.extend.worlds import make_scene, world_types
+from skillframe.execution.drives.actuated import CoupledPlant
+from skillframe.extend.records import make_scene
 from skillframe.fmu.actuator import ActuatorSpec
 from skillframe.fmu.opening import open_actuators
 from skillframe.robot.chain import ClosedChain
-from skillframe.robot.model import attach_payload, load_model
+from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot
 from skillframe.world.placement import fixture_poses
 from skillframe.world.plant import Plant
+from tests.references import attach_payload
 
 START = np.array([math.pi / 4, -math.pi / 2, 0.5])  # published
 # what exudyn's actuator has not: spool dynamics, seals, laminar edge, port valves, leakage
@@ -83,7 +85,7 @@ class ChainPlant:
     def motion(self, force):
         state, zdd = self._at(self.z, self.zd, force)
         driven = self.chain.driven
-        x, v = state.piston
+        x, v = state.driven_motion
         return Motion(x, v, (state.embedding @ zdd + state.drift)[driven])
 
     def advance(self, begin, end, step):

@@ -10,9 +10,10 @@ from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
+from skillframe_hydraulics.declared import noise_of
+from skillframe_hydraulics.law.hydraulic import tool_task
+from skillframe_hydraulics.law.vdc_actuator import cylinders
 
-from skillframe.machine.law.hydraulic import plane_task
-from skillframe.machine.law.vdc_actuator import cylinders
 from skillframe.robot.chain import ClosedChain
 
 SPOOL_HZ, SPOOL_DAMPING, TICKS = 30.0, 0.707, 1.5e-3
@@ -24,10 +25,10 @@ def poles(robot, gains, delay=0.0):
     chain = ClosedChain(robot)
     c, z = cylinders(robot.spec.actuation), chain.minimal(robot.home)
     state, n, k = chain.at(z, 0.0 * z), len(z), len(c.area_a)
-    mass, arms, (x, _) = state.mass, state.arms, state.piston
-    jacobian, spring = plane_task(chain).jacobian(state), c.area_a / (c.arm_a + x) + c.area_b / (c.arm_b + c.stroke - x)
+    mass, arms, (x, _) = state.mass, state.arms, state.driven_motion
+    jacobian, spring = tool_task(chain).jacobian(state), c.area_a / (c.arm_a + x) + c.area_b / (c.arm_b + c.stroke - x)
     lead = np.linalg.solve(jacobian, np.diag([LEAD, LEAD] + [gains.joint] * (n - 2)) @ jacobian)
-    w, wf, ws = (2.0 * np.pi * f for f in (robot.spec.sensors.corner_hz, gains.force_corner, SPOOL_HZ))
+    w, wf, ws = (2.0 * np.pi * f for f in (noise_of(robot.spec).corner_hz, gains.force_corner, SPOOL_HZ))
     sizes = {"z": n, "v": n, "f": k, "m": n, "r": n, "fm": k, "fr": k, "fv": k, "fs": k, "u": k, "du": k, "told": k}
     edges = np.cumsum([0, *sizes.values()])
     at = {name: slice(*pair) for name, pair in zip(sizes, pairwise(edges), strict=True)}

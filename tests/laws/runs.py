@@ -4,12 +4,13 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+from skillframe_worlds.hooks import skillframe_worlds as world_types
 
 from skillframe.execution.executor import Setup, simulate
-from skillframe.extend.worlds import make_scene, world_types
+from skillframe.extend.records import make_scene
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import Limits, load_robot
-from skillframe.world.sensors import SensorSettings
+from skillframe.world.quantities import SensorSettings
 
 SILENT = SensorSettings(
     force_noise=0.0, torque_noise=0.0, force_bias=0.0, torque_bias=0.0, position_noise=0.0, rotation_noise=0.0

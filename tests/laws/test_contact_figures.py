@@ -8,7 +8,7 @@ from skillframe.frames import Pose, norm
 from skillframe.skill import Command, Impedance, Skill, Status, no_reasons
 from skillframe.world.placement import fixture_poses
 from skillframe.world.plant import Plant
-from skillframe.world.sensors import SensorSettings
+from skillframe.world.quantities import SensorSettings
 from tests.laws.pushing import Push, impedance
 from tests.laws.runs import SILENT, run, setup
 

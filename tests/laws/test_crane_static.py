@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from skillframe.fmu.toolchain import find_compiler
+from skillframe.fmu.build import find_compiler
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.laws.crane_exudyn import Crane
 from tests.laws.crane_plants import START, ChainPlant, areas, coupled, crane, cylinders, simulated, tooled
@@ -22,6 +22,7 @@ def closed_form(cylinder, force, low=30e5):
 
 
 @pytest.mark.parametrize("z", POSES)
+@pytest.mark.slow
 def test_without_friction_the_coupled_crane_stays_at_the_closed_form_pressures(z):
     plant = ChainPlant(z)
     master = coupled(plant, cylinders(**NO_FRICTION), 1e-3, z=z)
@@ -49,7 +50,7 @@ def stiffness(z, geometric=True):
     """Of the closed valves in minimal coordinates: oil through the moment arms, load through their change, gravity."""
     chain, z, step = tooled(), np.asarray(z), 1e-6
     rest = chain.at(z, np.zeros(3))
-    force, x = rest.holding_force(), rest.piston[0]
+    force, x = rest.holding_force(), rest.driven_motion[0]
     oil = []
     for c, position in zip(cylinders(), x, strict=True):
         (a, b), modulus = areas(c), c["bulk_modulus"]

@@ -8,7 +8,7 @@ import pytest
 
 from skillframe.execution.executor import simulate
 from skillframe.execution.trace import Trace
-from skillframe.world.sensors import SensorSettings
+from skillframe.world.quantities import SensorSettings
 from tests.laws.pushing import Push, impedance
 from tests.laws.runs import setup
 
@@ -65,12 +65,12 @@ def check(robot, world, duration, alone):
         assert_identical(whole, outcomes(robot, world, np.array([trial]), duration))
 
 
-@pytest.mark.parametrize("robot", ["free_tool", "panda"])
+@pytest.mark.parametrize("robot", [pytest.param("free_tool", marks=pytest.mark.slow), "panda"])
 def test_the_valley_s_rows_are_identical_in_chunks_in_reverse_and_alone(robot):
     check(robot, "valley", 0.5, alone=(0, 17))
 
 
-@pytest.mark.parametrize("robot", ["free_tool", "panda"])
+@pytest.mark.parametrize("robot", ["free_tool", pytest.param("panda", marks=pytest.mark.slow)])
 def test_a_varied_mass_and_a_second_nominal_batch_change_nothing_of_that(robot):
     check(robot, "funnel", 0.4, alone=(3,))
 
@@ -78,11 +78,13 @@ def test_a_varied_mass_and_a_second_nominal_batch_change_nothing_of_that(robot):
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", ["free_tool", "panda"])
 @pytest.mark.parametrize("world", ["peg_in_hole", "hose_coupler"])
+@pytest.mark.figures
 def test_rows_with_meshes_in_contact_are_identical_in_chunks_in_reverse_and_alone(robot, world):
     check(robot, world, 1.0, alone=range(0, 24, 4))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", ["free_tool", "panda"])
+@pytest.mark.figures
 def test_the_valley_s_rows_are_identical_one_by_one_to_the_end(robot):
     check(robot, "valley", 1.5, alone=range(24))

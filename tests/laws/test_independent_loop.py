@@ -71,7 +71,7 @@ def compare(robot_name, world, stiffness, speed, duration, count=TRIALS):
     return difference, successes
 
 
-@pytest.mark.parametrize("robot_name", ["free_tool", "panda"])
+@pytest.mark.parametrize("robot_name", [pytest.param("free_tool", marks=pytest.mark.slow), "panda"])
 def test_the_valley_s_outcomes_equal_those_of_the_independent_loop(robot_name):
     difference, successes = compare(robot_name, "valley", impedance("x"), speed=0.06, duration=1.2, count=8)
     assert 0 < successes < 8  # both kinds of outcome are compared, and the second loop takes a trial at a time
@@ -79,12 +79,14 @@ def test_the_valley_s_outcomes_equal_those_of_the_independent_loop(robot_name):
 
 
 @pytest.mark.slow
+@pytest.mark.figures
 def test_the_peg_s_outcomes_equal_those_of_the_independent_loop():
     difference, _ = compare("free_tool", "peg_in_hole", impedance("x", "y"), speed=0.02, duration=3.6)
     assert difference.max() <= 1e-5
 
 
 @pytest.mark.slow
+@pytest.mark.figures
 def test_the_arm_s_peg_ends_alike_in_the_independent_loop_though_contact_amplifies_rounding():
     """A mesh against a ring of boxes switches contacts, and the arm's elbow is held by damping alone: some trials turn
     1e-16 into 5e-5 rad. Outcomes are all the same, and most states too."""

@@ -28,6 +28,7 @@ def common_body(scene):
 
 
 @pytest.mark.slow
+@pytest.mark.figures
 def test_plant_and_oracle_agree_on_which_tilted_pegs_jam():
     cases = np.array(list(itertools.product(FRICTION, TILT, TURN_STIFFNESS)))
     friction, tilt, turn = cases[:, 0], np.deg2rad(cases[:, 1]), cases[:, 2]

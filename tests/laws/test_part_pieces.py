@@ -1,13 +1,14 @@
 """Parts as pieces in contact: a key stops a turn where rigid parts would, a pin slides at its friction."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from manifold3d import JoinType
+from skillframe_parts.record import world_of_file
 
-from skillframe.extend.part_worlds import world_of_file
-from skillframe.extend.worlds import make_scene
+from skillframe.extend.records import make_scene
 from skillframe.frames import matrix_from_quaternion, rotation_vector
 from tests import part_meshes
 from tests.laws.pushing import Hold, Push, impedance
@@ -17,7 +18,7 @@ SOFT_TURN = 0.010, 0.004  # rad; contacts sink by 0.06 mm on both sides; measure
 
 
 def in_world(path):
-    record = world_of_file(str(path))
+    record = world_of_file(Path(path))
     return replace(setup("free_tool", "free"), scene=(scene := make_scene(record, {})),
                    center_of_compliance=np.array(scene.tool.frames["tip"]))  # fmt: skip
 

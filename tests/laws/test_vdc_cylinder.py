@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from skillframe_hydraulics.checks.figures import EDGES
+from skillframe_hydraulics.law import vdc_actuator as act
+from skillframe_hydraulics.law.vdc_adaptation import relative_bounds
 
 from skillframe.errors import InputError
-from skillframe.machine.law import vdc_actuator as act
-from skillframe.machine.law.vdc_adaptation import relative_bounds
 from skillframe.robot.spec import load_robot
 from tests.laws.vdc_loop import START, crane, growth, leg, runge_kutta, task
 from tests.oracle import valve_law, vdc
@@ -30,9 +31,10 @@ def random_cylinders(seed):
 
 @given(SEEDS)
 def test_the_inverse_valve_makes_the_piston_forces_rate_what_the_law_asks_for(seed):
-    """f_p' = f_pr' + B (k_x (xd_r - xd) + k_f (f_pr - f_p)), for any pressures and motion, leakage included."""
+    """f_p' = f_pr' + B (k_x (xd_r - xd) + k_f (f_pr - f_p)), for any pressures, motion, leakage and edges."""
     rng, x, xd, pressures = random_cylinders(seed)
-    leaky = dataclasses.replace(CYLINDERS, leakage=np.full(3, 1e-12))
+    edges = {name: rng.uniform(0.3, 2.0, 3) for name in EDGES}
+    leaky = dataclasses.replace(CYLINDERS, leakage=np.full(3, 1e-12), **edges)
     xd_r, f_pr, f_rate = rng.normal(size=3) * 0.2, rng.normal(size=3) * 4e4, rng.normal(size=3) * 1e5
     demand = act.flow_demand(leaky, GAINS, (x, xd, xd_r), (f_pr, f_rate), pressures)
     rate_a, rate_b = valve_law.pressure_rates(leaky, pressures, x, xd, act.inverse_valve(leaky, demand, x, pressures))
@@ -139,7 +141,7 @@ class Oil:
         """Derivatives of (z, zd, p_a, p_b, theta_f), and nu."""
         z, zd, p_a, p_b, rub = y
         state, xd_r, f_pr, motion = self.wanted(t, z, zd, rub)
-        x, xd = state.piston
+        x, xd = state.driven_motion
         zdd, h = state.acceleration(act.pressure_force(OILED, p_a, p_b) - valve_law.friction(OILED, xd)), 1e-5
         drive = valve_law.friction_regressor(xd_r) * (xd_r - xd)
         learned = projected_rate(rub, drive, self.learning, *self.bounds)
@@ -163,6 +165,7 @@ class Oil:
         return np.array(history)
 
 
+@pytest.mark.slow
 def test_the_accompanying_function_of_crane_and_oil_together_never_grows():
     """1e-6 of the start: what steps of 2 ms and the difference for the force's rate leave."""
     nu = Oil().run()
@@ -171,15 +174,18 @@ def test_the_accompanying_function_of_crane_and_oil_together_never_grows():
 
 
 @pytest.mark.parametrize("broken", ["velocity", "force rate"])
+@pytest.mark.slow
 def test_with_a_term_of_the_cylinders_law_left_out_it_grows(broken):
     assert growth(Oil(broken).run(0.15)) > 1e-3  # it does so at once
 
 
+@pytest.mark.slow
 def test_with_friction_believed_a_fifth_too_small_learning_keeps_the_function_from_growing():
     nu = Oil(believed=0.8, learning=RUB_GAIN).run()
     assert growth(nu) < 1e-6
 
 
+@pytest.mark.slow
 def test_with_friction_believed_a_fifth_too_small_and_not_learned_it_grows():
     """With the belief's share of nu constant, the friction error's power is left: (theta^ - theta) Y_f (xd_r - xd)."""
     assert growth(Oil(believed=0.8).run()) > 1e-3

@@ -43,6 +43,7 @@ def test_the_task_finds_the_joints_of_a_position_and_refuses_what_it_cannot_reac
         task().solve(crane(), np.array([9.0, 1.0, 0.5]), START)
 
 
+@pytest.mark.slow
 def test_without_noise_and_with_the_true_model_the_sampled_law_follows_within_a_millimetre():
     """The start of the published path. The rate filter lags by 2/(2 pi 24 Hz) = 13 ms, which an acceleration of at most
     0.16 m/s^2 turns into 2.2 mm/s, and Lambda = 6 1/s into 0.36 mm: the rest is for the sampled control."""
@@ -56,6 +57,7 @@ def short(t, duration):
     return Path(path.position, 0.0 * path.velocity, 0.0 * path.acceleration)
 
 
+@pytest.mark.slow
 def test_a_run_is_bit_identical_for_one_seed():
     first, second = (run(Vdc(believed(), 16.0, 300.0), short, 0.1)[0] for _ in range(2))
     np.testing.assert_array_equal(first, second)

@@ -3,9 +3,9 @@
 from functools import cache
 
 import numpy as np
+from skillframe_hydraulics.law.vdc_adaptation import relative_bounds
+from skillframe_hydraulics.law.vdc_reference import ToolTask
 
-from skillframe.machine.law.vdc_adaptation import relative_bounds
-from skillframe.machine.law.vdc_reference import ToolTask
 from skillframe.robot.chain import ClosedChain
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot
@@ -25,7 +25,7 @@ def crane():
 
 @cache
 def task():
-    return ToolTask(crane(), (0, 2), ("extension",))
+    return ToolTask(crane(), np.eye(3)[[0, 2]], ("extension",))
 
 
 def quintic(s):

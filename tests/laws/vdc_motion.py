@@ -5,13 +5,14 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from skillframe_hydraulics.checks.feasibility import capacity
 
-from skillframe.machine.checks.feasibility import capacity
-from skillframe.robot.chain import ClosedChain, step
+from skillframe.robot.chain import ClosedChain
 from tests.laws.vdc_loop import CORNERS, crane, leg, task
 from tests.oracle.vdc import VdcController, VdcGains
 from tests.oracle.vdc_baselines import ModelBased, PistonPid
 from tests.oracle.vdc_reference import Path, required_motion
+from tests.references import chain_step
 
 DT = 1e-3
 NOISE = 1e-4  # encoders, white at 1 kHz [rad or m], published
@@ -122,7 +123,7 @@ def run(controller, path, seconds, duration=5.0, seed=0, noise=NOISE):
         force = np.clip(controller(measured, rate, wanted, z), *limits())
         errors[k] = (wanted.position - task().position(chain.at(z, zd)))[:2]
         speed = max(speed, float(np.hypot(*wanted.velocity[:2])))
-        z, zd = step(chain, z, zd, force, DT)
+        z, zd = chain_step(chain, z, zd, force, DT)
         if not np.all(np.isfinite(z)) or np.hypot(*errors[k]) > 1.0:
             return np.full_like(errors, np.nan), speed
     return errors, speed

@@ -6,7 +6,7 @@ and repeat no figures, in a fixed order, with hypothesis' random numbers fixed. 
 copy as it is. What was found is kept (`build/mutants.json`), so that a run that was cut short goes on; it is forgotten
 as soon as any file of the tree changes.
 
-    python -m tests.mutants.run [--only TEXT] [--jobs 2] [--again] [--json] [--page PAGE]
+    python -m tests.mutants.run [--only TEXT] [--jobs 2] [--again] [--json] [--results FILE]
 
 The exit code is 0 if at least 95 % are caught, 1 if not, and 2 if the list is wrong or the tests fail as they are.
 """
@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import csv
 import hashlib
 import json
 import os
@@ -37,7 +38,7 @@ LIST, KEPT = Path(__file__).with_name("mutants.toml"), ROOT / "build" / "mutants
 LEAST, LIMIT_S, LATE = 0.95, 600.0, -1000  # the share, the time for one change, and the code of one that took longer
 CACHES = {".hypothesis", ".pytest_cache", ".mypy_cache", ".ruff_cache", "__pycache__"}
 LEFT_OUT = CACHES | {".git", ".venv", "build", "dist"}
-MARK = "<!-- written by python -m tests.mutants.run --page -->"
+RESULTS = Path(__file__).with_name("caught.csv")  # of the last run: the page of the docs is made of it
 
 
 class WrongList(Exception):
@@ -230,27 +231,24 @@ def _line(outcome: Outcome) -> str:
     return f"{'caught  ' if outcome.caught else 'SURVIVED'} {outcome.seconds:5.1f} s  {outcome.what}  {outcome.by}"
 
 
-def table(listed: Sequence[Mutant], outcomes: Sequence[Outcome]) -> str:
-    """The page's table: what was changed, and what noticed it."""
-    rows = ["| changed in | so that | caught by |", "|---|---|---|"]
-    for m, o in zip(listed, outcomes, strict=True):
-        file, _, test = o.by.partition("::")
-        told = f"`{Path(file).name}`: {test.removeprefix('test_').replace('_', ' ')}" if o.caught else "**nothing**"
-        rows.append(f"| `{Path(m.file).name}` | {m.what}{' (s)' if m.survived else ''} | {told} |")
-    return "\n".join([f"{_sum(outcomes)}.", "", *rows])
-
-
 def _sum(outcomes: Sequence[Outcome]) -> str:
     caught = sum(o.caught for o in outcomes)
     return f"{len(outcomes)} single changes: {caught} caught, {len(outcomes) - caught} survived"
 
 
-def written(page: Path, text: str) -> None:
-    """Put a table below the mark of a page."""
-    before, mark, _ = page.read_text(encoding="utf-8").partition(MARK)
-    if not mark:
-        raise WrongList(f"{page} holds no line {MARK!r}")
-    page.write_text(f"{before}{MARK}\n\n{text}\n", encoding="utf-8")
+def caught_by(path: Path = RESULTS) -> dict[str, str]:
+    """The test that caught each change in the last run, "" for those that survived."""
+    with path.open(newline="", encoding="utf-8") as file:
+        return {row["change"]: row["caught_by"] for row in csv.DictReader(file)}
+
+
+def record(path: Path, listed: Sequence[Mutant], outcomes: Sequence[Outcome]) -> None:
+    """Write outcomes to a file of results. Results of other changes stay as long as these are listed."""
+    known = (caught_by(path) if path.is_file() else {}) | {o.what: o.by if o.caught else "" for o in outcomes}
+    with path.open("w", newline="", encoding="utf-8") as file:
+        rows = csv.writer(file, lineterminator="\n")
+        rows.writerow(("change", "caught_by"))
+        rows.writerows((m.what, known[m.what]) for m in listed if m.what in known)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -260,7 +258,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--jobs", type=int, default=1, help="how many at a time, each in a copy of its own")
     parser.add_argument("--again", action="store_true", help="forget what an earlier run found")
     parser.add_argument("--json", action="store_true", help="print what came of each as JSON")
-    parser.add_argument("--page", type=Path, help="a page below whose mark the table is written")
+    parser.add_argument("--results", type=Path, help="a CSV file that is updated with the results")
     given = parser.parse_args(arguments)
     listed = mutants()
     chosen = [m for m in listed if given.only in m.what or given.only in m.file]
@@ -269,8 +267,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             raise WrongList(problem)
         state = state_of_tree()
         outcomes = all_judged(chosen, max(given.jobs, 1), {} if given.again else kept_of(state), state)
-        if given.page:
-            written(given.page, table(chosen, outcomes))
+        if given.results:
+            record(given.results, listed, outcomes)
     except WrongList as error:
         print(f"mutants: {error}", file=sys.stderr)
         return 2

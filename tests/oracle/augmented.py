@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from skillframe_hydraulics.force.identification import IdentificationSettings
 
 from skillframe.frames import Float
-from skillframe.machine.force.identification import IdentificationSettings
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -66,13 +66,13 @@ TEXT = {
     "python's underscore": cell(5, "fz", "1_0"),
     "other digits": cell(5, "fz", "\u0661\u0662"),
     "a date for a time": cell(5, "t", "2026-01-01T00:00:00"),
-    "time repeats": lambda rows: cell(9, "t", rows[8][rows[0].index("t")])(rows),
+    "time stands": whole("1.0", "t"),
     "time runs back": lambda rows: cell(9, "t", rows[3][rows[0].index("t")])(rows),
     "no clock": without("t"),
     "no attitude": without("qx", "qy", "qz", "qw"),
     "no wrench": without(*WRENCH),
     "no position": without("px", "py", "pz"),
-    "half a wrench": without("tx", "ty", "tz"),
+    "half a force": without("fz"),
     "dead wrench": whole("0.0", *WRENCH),
     "stuck wrench": whole("1.25", *WRENCH),
     "no unit quaternion": cell(7, "qx", "3.0"),
@@ -164,7 +164,7 @@ ARRAYS = {
     "no rows": lambda file: {name: v if name == "meta" else v[:0] for name, v in file.items()},
     "one row": lambda file: {name: v if name == "meta" else v[:1] for name, v in file.items()},
     "NaN": spoiled("fz", lambda v: v.__setitem__(17, np.nan)),
-    "time repeats": spoiled("t", lambda v: v.__setitem__(17, v[16])),
+    "time stands": spoiled("t", lambda v: v.__setitem__(slice(None), v[16])),
 }
 
 

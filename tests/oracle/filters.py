@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from skillframe_hydraulics.force.damped import share_of
+from skillframe_hydraulics.force.impulse import sampled_gains
 
 from skillframe.frames import Float
-from skillframe.machine.force.damped import share_of
-from skillframe.machine.force.impulse import sampled_gains
 
 
 class CriticallyDamped:

@@ -6,16 +6,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
+from skillframe_hydraulics.force.identification import Identification
+from skillframe_hydraulics.force.momentum import Estimate, ForceSettings, force_gain
+from skillframe_hydraulics.law.hydraulic import tool_axes
 
 from skillframe.frames import Float
-from skillframe.machine.force.identification import Identification
-from skillframe.machine.force.momentum import Estimate, ForceSettings, force_gain
-from skillframe.signals.kalman import SteadyWrenchFilter
+from skillframe.signals import SteadyWrenchFilter
 from tests.oracle.filters import CriticallyDamped, ImpulseFilter, Undamped
 
 if TYPE_CHECKING:
-    from skillframe.machine.law.hydraulic import Measured, Terms
-    from skillframe.machine.law.vdc_actuator import Cylinders
+    from skillframe_hydraulics.law.hydraulic import Measured, Terms
+    from skillframe_hydraulics.law.vdc_actuator import Cylinders
+
     from skillframe.robot.chain import ClosedChain
 
 
@@ -38,17 +40,16 @@ class MomentumRate:
 
 
 def force_from_residual(jacobian: Float, residual: Float, variance: Float) -> tuple[Float, Float]:
-    """Equation (2): the force (N, 2) that explains residuals (N, n) of variances (N, n) best, and its sigma (N, 2).
+    """Equation (2): the force (N, m) that explains residuals (N, n) of variances (N, n) best, and its sigma (N, m).
 
     Args:
-        jacobian: J (N, 2, n) of the tool's point.
+        jacobian: J (N, m, n) of the tool's point.
         residual: what is left for J^T f.
         variance: diagonal of W^-1.
     """
     weighted = jacobian / variance[:, None, :]
     a = weighted @ np.swapaxes(jacobian, -1, -2)
-    determinant = a[:, 0, 0] * a[:, 1, 1] - a[:, 0, 1] * a[:, 1, 0]
-    covariance = a[:, ::-1, ::-1] * _COFACTORS / determinant[:, None, None]  # inverse of a symmetric 2 x 2 matrix
+    covariance = np.linalg.inv(a)
     force = covariance @ (weighted @ residual[..., None])
     return force[..., 0], np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
 
@@ -64,9 +65,6 @@ def standing_out(force: Float, sigma: Float, doubted: float) -> Float:
     return np.asarray(force * (power / (1.0 + power)))
 
 
-_COFACTORS = np.array([[1.0, -1.0], [-1.0, 1.0]])
-
-
 class ForceEstimator:
     """Estimates online, identifies in air when told to, and holds what it found.
 
@@ -79,7 +77,7 @@ class ForceEstimator:
 
     Attributes:
         identification: theta, its standard deviation, and how many rows it has seen.
-        raw: (N, 2) the force before its Kalman filter [N].
+        raw: (N, m) the force before its Kalman filter [N].
         residual: (N, n) what is left for J^T f [Nm or N].
         regressors: (N, n, 2k + 1) phi, to be read and not kept.
     """
@@ -87,17 +85,17 @@ class ForceEstimator:
     def __init__(
         self, chain: ClosedChain, cylinders: Cylinders, count: int, dt: float, settings: ForceSettings | None = None
     ) -> None:
-        self.settings, self._chain, self._cylinders, self._dt = settings or ForceSettings(), chain, cylinders, dt
-        s = self.settings
+        self.settings, self._cylinders, self._dt = settings or ForceSettings(), cylinders, dt
+        s, m = self.settings, len(tool_axes(chain))
         self.identification = Identification(count, len(cylinders.area_a), s.identify)
         self._left, self._filter = MomentumRate(dt), CriticallyDamped(s.corner, dt)
         self._rate_share = float(-np.expm1(-2.0 * np.pi * s.rate_corner * dt))
         self._wrench = None if s.force_corner is None else ImpulseFilter(s.force_corner, dt)
-        self._undamped, self._feedback = Undamped(s.corner, dt), force_filter(s.feedback_corner, dt)
+        self._undamped, self._feedback = Undamped(s.corner, dt), force_filter(s.feedback_corner, dt, m)
         self._noise: Float = np.square(np.array(s.row_noise))
         self._every, self._tick, self.calibrating = max(1, round(s.identify.period / dt)), 0, False
-        self._columns: Float = np.zeros((count, len(s.row_noise), 2 * len(cylinders.area_a) + 4))
-        self.raw: Float = np.zeros((count, 2))
+        self._columns: Float = np.zeros((count, len(s.row_noise), 2 * len(cylinders.area_a) + 2 + m))
+        self.raw: Float = np.zeros((count, m))
         self.residual: Float = np.zeros((count, len(s.row_noise)))
 
     def calibrate(self, on: bool) -> None:
@@ -109,21 +107,19 @@ class ForceEstimator:
             self.identification.start()
         self.calibrating = on
 
-    def start(self, measured: Measured) -> None:
-        """Begin at a measurement, the machine at rest."""
-        count = len(measured.z)
+    def start(self) -> None:
+        """Begin, with the machine at rest."""
         self._left.start()
         self._filter.start()
-        self._rate: Float = np.zeros((count, len(self._cylinders.area_a)))
+        self._rate: Float = np.zeros((len(self.raw), len(self._cylinders.area_a)))
         self._since: Float = np.zeros_like(self._rate)
-        self._load = self._chain.load_gravity(measured.z)
         self._tick = 0
 
     def step(self, measured: Measured, terms: Terms) -> Estimate:
         """One estimate from one measurement and the model's terms there."""
-        c = self._cylinders
+        c, m = self._cylinders, self.raw.shape[1]
         if self._tick % self._every == 0:
-            self._load = self._chain.load_gravity(measured.z)
+            self._load = terms.load
         before = self._rate
         self._rate = before + self._rate_share * (terms.piston_rate - self._rate)
         shape = np.tanh(self._rate / self.settings.sliding_speed)
@@ -132,7 +128,7 @@ class ForceEstimator:
         known = joint_force(terms.arms, push) + terms.drift - terms.gravity
         momentum = (terms.mass @ measured.rate[..., None])[..., 0]
         columns = self._filter.step(self._fill(self._left.step(momentum, known), terms, shape))
-        residual, jacobian, phi = columns[..., 0], np.swapaxes(columns[..., 1:3], -1, -2), columns[..., 3:]
+        residual, jacobian, phi = columns[..., 0], np.swapaxes(columns[..., 1 : 1 + m], -1, -2), columns[..., 1 + m :]
         sliding = self._sliding(before)
         if self.calibrating and self._tick % self._every == 0:
             rows = joint_force(np.abs(terms.arms), np.where(sliding, 0.0, 1.0)) == 0.0
@@ -143,7 +139,10 @@ class ForceEstimator:
         if self._tick == 0:
             self._begin()
         self._tick += 1
-        level = sliding + 1.0 * (self._since >= self.settings.settle + self.settings.memory)
+        settled = self._since >= self.settings.settle + self.settings.memory
+        level = sum(
+            1.0 * (joint_force(np.abs(terms.arms), np.where(one, 0.0, 1.0)) == 0.0) for one in (sliding, settled)
+        )
         feedback = self._feedback.step(self.raw)
         answered = standing_out(feedback, sigma, self.settings.doubted)
         return Estimate(self._smooth(), sigma, level, feedback, answered)
@@ -157,11 +156,11 @@ class ForceEstimator:
 
     def _fill(self, left: Float, terms: Terms, shape: Float) -> Float:
         """(N, n, 3 + 2k + 1) all that passes L: what is left of p', J^T, and the columns of phi."""
-        columns, k = self._columns, shape.shape[-1]
+        columns, k, m = self._columns, shape.shape[-1], self.raw.shape[1]
         spread = transposed(terms.arms)
-        columns[..., 0], columns[..., 1:3] = left, np.swapaxes(terms.jacobian, -1, -2)
-        np.multiply(spread, -shape[:, None, :], out=columns[..., 3 : 3 + k])
-        np.multiply(spread, -terms.piston_rate[:, None, :], out=columns[..., 3 + k : 3 + 2 * k])
+        columns[..., 0], columns[..., 1 : 1 + m] = left, np.swapaxes(terms.jacobian, -1, -2)
+        np.multiply(spread, -shape[:, None, :], out=columns[..., 1 + m : 1 + m + k])
+        np.multiply(spread, -terms.piston_rate[:, None, :], out=columns[..., 1 + m + k : 1 + m + 2 * k])
         np.negative(self._load, out=columns[..., -1])
         return columns
 
@@ -193,9 +192,9 @@ class ForceEstimator:
         return self._wrench.ahead(1.0 / (np.pi * self.settings.sensor_corner))
 
 
-def force_filter(corner: float, dt: float) -> SteadyWrenchFilter:
-    """The converged Kalman filter of a force's two components, `kalman`'s model with a corner [Hz]."""
-    return SteadyWrenchFilter(force_gain(corner, dt), dt)
+def force_filter(corner: float, dt: float, components: int) -> SteadyWrenchFilter:
+    """The converged Kalman filter of a force's components, `kalman`'s model with a corner [Hz]."""
+    return SteadyWrenchFilter(force_gain(corner, dt, components), dt)
 
 
 def transposed(arms: Float) -> Float:

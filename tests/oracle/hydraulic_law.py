@@ -8,22 +8,22 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-
-from skillframe.frames import Float
-from skillframe.machine.law.hydraulic import (
+from skillframe_hydraulics.law.hydraulic import (
     Demand,
     HydraulicGains,
     Measured,
     Reference,
     Terms,
-    plane_axes,
-    plane_task,
+    tool_axes,
+    tool_task,
 )
-from skillframe.machine.law.vdc_actuator import CylinderGains, Cylinders, friction_parameters
-from skillframe.machine.law.vdc_adaptation import relative_bounds
-from skillframe.machine.law.vdc_body import parameters
+from skillframe_hydraulics.law.vdc_actuator import CylinderGains, Cylinders, friction_parameters
+from skillframe_hydraulics.law.vdc_adaptation import relative_bounds
+from skillframe_hydraulics.law.vdc_body import parameters
+
+from skillframe.frames import Float
 from skillframe.robot.chain import ChainState, ClosedChain
-from skillframe.signals.rates import RateFilter
+from skillframe.signals import RateFilter
 from tests.oracle.valve_law import (
     across_deadband,
     bristle_after,
@@ -40,19 +40,19 @@ from tests.oracle.vdc_reference import Path, required_motion
 
 def terms(chain: ClosedChain, z: Float, rate: Float, theta: Float | None = None) -> Terms:
     """The model's terms at minimal coordinates and rates (N, n), with its own inertias or theta (N, B, 10)."""
-    axes, given = list(plane_axes(chain)), [None] * len(z) if theta is None else theta
+    axes, given = tool_axes(chain), [None] * len(z) if theta is None else theta
     rows = [_terms(chain, axes, *row) for row in zip(z, rate, given, strict=True)]
     return Terms(*(np.array(column) for column in zip(*rows, strict=True)))
 
 
-def _terms(chain: ClosedChain, axes: list[int], z: Float, rate: Float, theta: Float | None) -> Terms:
+def _terms(chain: ClosedChain, axes: Float, z: Float, rate: Float, theta: Float | None) -> Terms:
     state, frame = chain.at(z, rate), chain.robot.tool_frames[0]
-    jacobian = state.jacobian(frame)[axes]
-    tip = np.array(state.data.oMf[frame].translation)[axes]
+    jacobian = axes @ state.jacobian(frame)[:3]
+    tip = axes @ np.array(state.data.oMf[frame].translation)
     mass, gravity = _reduced(state, theta)
     return Terms(
-        mass, _kinetic_gradient(chain, z, rate, theta), gravity, jacobian, state.arms, *state.piston,
-        tip, jacobian @ rate,
+        mass, _kinetic_gradient(chain, z, rate, theta), gravity, jacobian, state.arms, *state.driven_motion,
+        tip, jacobian @ rate, state.load_gravity,
     )  # fmt: skip
 
 
@@ -88,7 +88,7 @@ class HydraulicLaw:
 
     def __init__(self, chain: ClosedChain, cylinders: Cylinders, gains: HydraulicGains, count: int, dt: float) -> None:
         self.chain, self.cylinders, self.gains, self._dt = chain, cylinders, gains, dt
-        self._task = plane_task(chain)
+        self._task = tool_task(chain)
         self.tell(np.tile(parameters(chain.model), (count, 1, 1)))
         rub = friction_parameters(cylinders)
         self.friction: Float = np.tile(rub, (count, 1, 1))
@@ -130,7 +130,7 @@ class HydraulicLaw:
             forces = net_forces(motion, self.theta[i], self._gain)
             required[i] = piston_forces(state, motion, forces, self._pushed(state, measured.force[i]))
             rate_r[i] = motion.tree_required[self.chain.driven]
-            piston[i], speed[i] = state.piston
+            piston[i], speed[i] = state.driven_motion
             self._learn(i, motion)
         shape = self._slide(rate_r, measured.force, ids)
         force = required + np.sum(shape * self.friction, axis=-2)
@@ -140,28 +140,27 @@ class HydraulicLaw:
 
     def _required(self, measured: Measured, reference: Reference, i: int) -> tuple[ChainState, Bodies]:
         state = self.chain.at(measured.z[i], measured.rate[i])
-        n = len(self.chain.independent)
+        n, m = len(self.chain.independent), len(self._task.axes)
         wanted = Path(
             np.concatenate([reference.position[i], reference.joint[i]]),
             np.concatenate([reference.velocity[i], reference.joint_rate[i]]),
             np.zeros(n) if reference.acceleration is None else reference.acceleration[i],
         )  # fmt: skip
         gain, push = self.gains.joint * np.eye(n), np.zeros(n)
-        gain[:2, :2] = np.linalg.solve(reference.damping[i], reference.stiffness[i])
-        push[:2] = np.linalg.solve(reference.damping[i], self._answer(measured, reference, state, i))
+        gain[:m, :m] = np.linalg.solve(reference.damping[i], reference.stiffness[i])
+        push[:m] = np.linalg.solve(reference.damping[i], self._answer(measured, reference, state, i))
         required = required_motion(self._task, state, wanted, gain, push)
         return state, bodies(state, required.rate, required.acceleration)
 
     def _answer(self, measured: Measured, reference: Reference, state: ChainState, i: int) -> Float:
-        """(2,) f + f_ff, less what of the imbalance is not pursued."""
-        pushing, error = measured.force[i] + reference.push[i], reference.position[i] - self._task.position(state)[:2]
+        """(m,) f + f_ff, less what of the imbalance is not pursued."""
+        pushing, tip = measured.force[i] + reference.push[i], self._task.position(state)[: len(self._task.axes)]
+        error = reference.position[i] - tip
         imbalance = reference.damping[i] @ reference.velocity[i] + reference.stiffness[i] @ error + pushing
         return np.asarray(pushing - (1.0 - pursued(imbalance, measured.force[i], measured.sigma[i])) * imbalance)
 
     def _pushed(self, state: ChainState, force: Float) -> Float:
-        in_base = np.zeros(3)
-        in_base[self._task.axes] = force
-        return self._task.generalised(state, in_base)
+        return self._task.generalised(state, force @ self._task.axes)
 
     def _learn(self, i: int, motion: Bodies) -> None:
         if self.learning and self.gains.adaptation > 0.0:

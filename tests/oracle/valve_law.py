@@ -6,9 +6,9 @@ The second opinion on the formulas that the product writes once for arrays and e
 from __future__ import annotations
 
 import numpy as np
+from skillframe_hydraulics.law.vdc_actuator import ACROSS, ContactFriction, CylinderGains, Cylinders
 
 from skillframe.frames import Float
-from skillframe.machine.law.vdc_actuator import ACROSS, ContactFriction, CylinderGains, Cylinders
 
 SLIDING = 5e-3  # m/s at which friction without a state has risen to tanh(1)
 
@@ -50,8 +50,10 @@ def pressure_rates(
     """Rates of both chamber pressures with a valve that follows at once; the model that the law inverts."""
     p_a, p_b = pressures
     out, u_e = command > 0.0, opening(c.deadband, command)
-    q_a = u_e * c.edge * np.sqrt(np.where(out, _drop(c, c.supply_pressure - p_a), _drop(c, p_a - c.return_pressure)))
-    q_b = u_e * c.edge * np.sqrt(np.where(out, _drop(c, p_b - c.return_pressure), _drop(c, c.supply_pressure - p_b)))
+    wide_a, wide_b = np.where(out, c.edge_pa, c.edge_at), np.where(out, c.edge_bt, c.edge_pb)
+    drop_a = np.where(out, _drop(c, c.supply_pressure - p_a), _drop(c, p_a - c.return_pressure))
+    drop_b = np.where(out, _drop(c, p_b - c.return_pressure), _drop(c, c.supply_pressure - p_b))
+    q_a, q_b = u_e * c.edge * wide_a * np.sqrt(drop_a), u_e * c.edge * wide_b * np.sqrt(drop_b)
     leak = c.leakage * (p_a - p_b)
     rate_a = c.bulk_modulus / (c.area_a * (c.arm_a + x)) * (q_a - leak - c.area_a * xd)
     rate_b = c.bulk_modulus / (c.area_b * (c.arm_b + c.stroke - x)) * (leak + c.area_b * xd - q_b)
@@ -72,6 +74,7 @@ def flow_demand(
         pressures: of both chambers [Pa].
     """
     (x, xd, xd_r), (f_pr, rate), (p_a, p_b) = motion, force, pressures
+    x = np.where(c.stroke > 0.0, x, 0.0)  # a motor's chambers keep their volumes
     a, b = 1.0 / (c.arm_a + x), 1.0 / (c.arm_b + c.stroke - x)
     feedback = gains.velocity * (xd_r - xd) + gains.force * (f_pr - pressure_force(c, p_a, p_b))
     leak = c.leakage * (a + b) * (p_a - p_b)
@@ -83,6 +86,7 @@ def inverse_valve(
 ) -> Float:  # fmt: skip
     """Opening u_e (..., n) of the edges, not limited, that makes the flow demand; supply: p_S, nominal if not given."""
     (p_a, p_b), high = pressures, c.supply_pressure if supply is None else supply
+    x = np.where(c.stroke > 0.0, x, 0.0)  # a motor's chambers keep their volumes
     a, b = 1.0 / (c.arm_a + x), 1.0 / (c.arm_b + c.stroke - x)
     extend = np.sqrt(_drop(c, high - p_a)) * a + np.sqrt(_drop(c, p_b - c.return_pressure)) * b
     retract = np.sqrt(_drop(c, high - p_b)) * b + np.sqrt(_drop(c, p_a - c.return_pressure)) * a

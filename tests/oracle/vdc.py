@@ -1,9 +1,9 @@
-"""Virtual Decomposition Control over arrays, body by body through Pinocchio: the second opinion on `machine.law`.
+"""Virtual Decomposition Control over arrays, body by body through Pinocchio: the second opinion on the law.
 
-The same equations as `skillframe.machine.law.vdc`, which writes them as casadi expressions of the closed chain. Here
-bodies, Jacobians and their rates are Pinocchio's, and adaptation sets a rate to zero where the product clips. An ideal
-force actuator gets f_cr + k (xd_r - xd): k stands for the k_x/k_f of a cylinder's force loop (our choice), and adds
--k (xd_r - xd)^2 to the rate of the accompanying function.
+The same equations as `skillframe_hydraulics.law.vdc_body`, which writes them as casadi expressions of the closed chain.
+Here bodies, Jacobians and their rates are Pinocchio's, and adaptation sets a rate to zero where the product clips. An
+ideal force actuator gets f_cr + k (xd_r - xd): k stands for the k_x/k_f of a cylinder's force loop (our choice), and
+adds -k (xd_r - xd)^2 to the rate of the accompanying function.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from skillframe_hydraulics.law.vdc_adaptation import relative_bounds
+from skillframe_hydraulics.law.vdc_body import parameters
 
 from skillframe.frames import Float
-from skillframe.machine.law.vdc_adaptation import relative_bounds
-from skillframe.machine.law.vdc_body import parameters
 from skillframe.robot.chain import ChainState, ClosedChain
 from tests.oracle.vdc_body import mass_matrix, regressor
 from tests.oracle.vdc_reference import Required
@@ -106,7 +106,7 @@ def piston_forces(state: ChainState, motion: Bodies, forces: Float, tool: Float 
     """f_cr (actuators,) [N]; tool: generalised forces (n,) of the environment on the tool in minimal coordinates."""
     tree = np.einsum("bij,bi->j", motion.jacobian, forces) + state.chain.model.damping * motion.tree_required
     tau = state.embedding.T @ tree
-    return state.piston_force(tau if tool is None else tau - tool)
+    return state.actuator_force(tau if tool is None else tau - tool)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -149,7 +149,7 @@ class VdcController:
         """Piston forces (actuators,) for ideal force actuators, and the bodies' motion that `learn` needs."""
         motion = bodies(state, required.rate, required.acceleration)
         needed = piston_forces(state, motion, net_forces(motion, self.theta, self.gain), tool)
-        return needed + self.gains.piston * (state.arms @ required.rate - state.piston[1]), motion
+        return needed + self.gains.piston * (state.arms @ required.rate - state.driven_motion[1]), motion
 
     def learn(self, motion: Bodies, dt: float) -> None:
         """Adapt the parameters over a step of dt [s]."""

@@ -35,7 +35,7 @@ class PistonPid:
 
     def forces(self, state: ChainState, desired: ChainState, dt: float) -> Float:
         """Piston forces (actuators,) for a measured and a desired state; the integral starts holding the machine."""
-        (x, xd), (x_d, xd_d), w = state.piston, desired.piston, self._w
+        (x, xd), (x_d, xd_d), w = state.driven_motion, desired.driven_motion, self._w
         self._sum = self._sum + dt * (x_d - x)
         return np.asarray(self._mass * (2 * w * (xd_d - xd) + w**2 * (x_d - x) + w**3 / 8.0 * self._sum))
 
@@ -54,7 +54,7 @@ class ModelBased:
         """Piston forces (actuators,) for a measured and a desired state and desired zdd (n,)."""
         w = self._w
         zdd = acceleration + 2 * w * (desired.zd - state.zd) + w**2 * (desired.z - state.z)
-        return state.piston_force(state.mass @ zdd + state.bias)
+        return state.actuator_force(state.mass @ zdd + state.bias)
 
 
 def tune(error: Callable[[float], float], ladder: Sequence[float] = LADDER) -> float:

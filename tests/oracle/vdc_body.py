@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from skillframe_hydraulics.law.vdc_body import PARAMETERS
 
 from skillframe.frames import Float, cross, skew
-from skillframe.machine.law.vdc_body import PARAMETERS
 
 
 def moment_matrix(w: Float) -> Float:

@@ -49,9 +49,14 @@ def eye_forces(state: ChainState, tree: Float, piston: Float) -> Float:
     """
     rest = np.array(tree)
     rest[state.chain.driven] -= piston
-    if not len(state.constraint):
+    if not state.chain.loops:
         return np.zeros((0, 3))
-    solution = np.linalg.lstsq(state.constraint.T, rest, rcond=1e-12)[0]
+    model, axes = state.chain.model, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+    gaps = [
+        (pin.getFrameJacobian(model, state.data, a, axes) - pin.getFrameJacobian(model, state.data, b, axes))[:3]
+        for a, b in (loop.frames for loop in state.chain.loops)
+    ]
+    solution = np.linalg.lstsq(np.concatenate(gaps).T, rest, rcond=1e-12)[0]
     return np.asarray(solution, dtype=float).reshape(-1, 3)
 
 
@@ -68,7 +73,7 @@ def power_flows(state: ChainState, motion: Bodies, difference: Float, tool: Floa
     damping = model.damping * error
     tree = np.einsum("bij,bi->j", motion.jacobian, difference) + damping
     tau = state.embedding.T @ tree
-    piston = state.piston_force(tau if tool is None else tau - tool)
+    piston = state.actuator_force(tau if tool is None else tau - tool)
     eyes = eye_forces(state, tree, piston)
     through = _joint_forces(state, difference, eyes)
     outer = np.einsum("bi,bi->b", motion.error, through)
@@ -84,8 +89,8 @@ def _joint_forces(state: ChainState, net: Float, eyes: Float) -> Float:
     """Forces (B, 6) through each joint into its body, body axes: from the tips to the ground."""
     model, data = state.chain.model, state.data
     through = [pin.Force(row) for row in net]
-    for cylinder, force in zip(state.chain.cylinders, eyes, strict=True):
-        for frame, sign in ((cylinder.eye, -1.0), (cylinder.rod_eye, 1.0)):
+    for loop, force in zip(state.chain.loops, eyes, strict=True):
+        for frame, sign in zip(loop.frames, (-1.0, 1.0), strict=True):
             joint = model.frames[frame].parentJoint
             through[joint - 1] += _at_body(state, frame, sign * force)
     for joint in range(model.njoints - 1, 0, -1):
@@ -116,8 +121,8 @@ def _inner(state: ChainState, error: Float, through: Float) -> Float:
 
 def _eye_flows(state: ChainState, error: Float, eyes: Float) -> Float:
     model, result = state.chain.model, np.zeros((len(eyes), 2))
-    for row, (cylinder, force) in enumerate(zip(state.chain.cylinders, eyes, strict=True)):
-        for side, (frame, sign) in enumerate(((cylinder.eye, 1.0), (cylinder.rod_eye, -1.0))):
+    for row, (loop, force) in enumerate(zip(state.chain.loops, eyes, strict=True)):
+        for side, (frame, sign) in enumerate(zip(loop.frames, (1.0, -1.0), strict=True)):
             joint = model.frames[frame].parentJoint
             result[row, side] = float(error[joint - 1] @ _at_body(state, frame, sign * force).vector)
     return result
@@ -129,7 +134,7 @@ def _balance(state: ChainState, net: Float, outer: Float, inner: Float, eyes: Fl
         parent = int(model.parents[joint])
         if parent:
             result[parent - 1] -= inner[joint - 1]
-    for row, cylinder in enumerate(state.chain.cylinders):
-        for side, frame in enumerate((cylinder.eye, cylinder.rod_eye)):
+    for row, loop in enumerate(state.chain.loops):
+        for side, frame in enumerate(loop.frames):
             result[model.frames[frame].parentJoint - 1] += eyes[row, side]
     return np.asarray(result)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from skillframe_hydraulics.law.vdc_reference import ToolTask
 
 from skillframe.frames import Float
-from skillframe.machine.law.vdc_reference import ToolTask
 from skillframe.robot.chain import ChainState
 
 

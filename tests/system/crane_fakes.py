@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from skillframe.document.file import save
-from skillframe.document.source import learned
+from skillframe_testkit.suites import example_demonstrations
+
+from skillframe.document.file import learned, save
 from skillframe.extend.registry import registry
 from skillframe.fmu.build import build_fmu
 from skillframe.robot.spec import load_robot
-from skillframe.testing import example_demonstrations
 
 CRANE = load_robot("hiab_xs031").folder
 TABLE = """

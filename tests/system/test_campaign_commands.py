@@ -28,16 +28,15 @@ VARY = """
 "world.friction" = { choice = [0.1, 0.3] }
 "world.slope" = { grid = [0.7, 0.8] }
 "sensor.force_noise" = { sobol = [0.1, 0.5] }
+[set]
+"start.offset_z" = 0.04
 """
 
 
 @pytest.fixture(scope="module")
 def demonstration(tmp_path_factory):
     path = tmp_path_factory.mktemp("demonstration") / "demo.npz"
-    assert (
-        run(["demonstration", "record", "--world", "valley", "--robot", "free_tool", "--seed", "1", "--out", str(path)])
-        == 0
-    )
+    assert run(["record", "--world", "valley", "--robot", "free_tool", "--seed", "1", "--out", str(path)]) == 0
     return path
 
 
@@ -56,11 +55,13 @@ def table(folder):
     return list(csv.DictReader((folder / "results.csv").read_text().splitlines()))
 
 
+@pytest.mark.slow
 def test_run_status_and_replay_tell_one_story(campaign, tmp_path, capsys):
     out = tmp_path / "results"
-    assert run(["campaign", "run", campaign(), "--out", str(out), "--traces", "3"]) == 0
+    assert run(["campaign", "run", campaign(trials=6), "--out", str(out), "--traces", "1"]) == 0
     rows = table(out)
-    assert [row["trial"] for row in rows] == [str(i) for i in range(12)]
+    assert [row["trial"] for row in rows] == [str(i) for i in range(6)]
+    assert {row["success"] for row in rows} == {"0", "1"}
     assert {row["world.slope"] for row in rows} == {"0.7", "0.8"}
     capsys.readouterr()
     assert run(["campaign", "status", str(out), "--json"]) == 0
@@ -70,13 +71,12 @@ def test_run_status_and_replay_tell_one_story(campaign, tmp_path, capsys):
     assert status["complete"]
     assert status["skills"] == summary["skills"]
     assert status["skills"]["replay:demo.npz"]["successes"] == successes
-    for trial in (11,):  # tests/laws/test_identity.py compares the rows of all trials
-        trace = tmp_path / f"{trial}.npz"
-        assert run(["campaign", "replay", str(out), str(trial), "--out", str(trace)]) == 0
-        meta = Trace.load(trace).meta
-        assert (meta["trial"], meta["success"]) == (trial, rows[trial]["success"] == "1")
-        assert repr(meta["peak_force_n"]) == rows[trial]["peak_force_n"]
-        assert repr(meta["draws"]["fixture.offset_x"]) == rows[trial]["fixture.offset_x"]
+    trace = tmp_path / "5.npz"  # tests/laws/test_identity.py compares the rows of all trials
+    assert run(["campaign", "replay", str(out), "5", "--out", str(trace)]) == 0
+    meta = Trace.load(trace).meta
+    assert (meta["trial"], meta["success"]) == (5, rows[5]["success"] == "1")
+    assert repr(meta["peak_force_n"]) == rows[5]["peak_force_n"]
+    assert repr(meta["draws"]["fixture.offset_x"]) == rows[5]["fixture.offset_x"]
     kept = Trace.load(out / "traces" / "00000_replay_demo.npz.npz")
     assert kept.meta["bodies"]
     assert repr(kept.meta["peak_force_n"]) == rows[0]["peak_force_n"]
@@ -107,6 +107,7 @@ def test_a_campaign_runs_again_from_its_own_folder(campaign, tmp_path):
     assert (tmp_path / "a" / "results.csv").read_bytes() == (tmp_path / "b" / "results.csv").read_bytes()
 
 
+@pytest.mark.slow
 def test_a_rate_below_its_bar_exits_1(campaign, tmp_path, capsys):
     vary = '"fixture.offset_x" = { uniform = [0.2, 0.3] }'  # the valley is somewhere else
     path = campaign(vary, trials=4, extra="[expect]\nrate = 0.9\n", seconds=0.5)
@@ -132,6 +133,7 @@ def test_what_cannot_run_exits_2_says_why_and_leaves_no_folder(campaign, tmp_pat
     assert sorted(p.name for p in tmp_path.iterdir()) == ["demo.npz", "valley.toml"]
 
 
+@pytest.mark.slow
 def test_a_start_out_of_reach_is_that_trials_failure_and_not_the_campaigns(campaign, tmp_path, capsys):
     vary = '"start.offset_x" = { values = [0.0, 0.0, 2.5, 0.0] }'
     text = campaign(vary, trials=4, seconds=0.1).replace("free_tool", "panda")
@@ -140,12 +142,6 @@ def test_a_start_out_of_reach_is_that_trials_failure_and_not_the_campaigns(campa
     assert run(["campaign", "run", text, "--out", str(tmp_path / "out"), "--traces", "0"]) == 0
     rows = table(tmp_path / "out")
     assert [row["failure"].startswith("error: arm 'arm' does not reach") for row in rows] == [False, False, True, False]
-
-
-@pytest.mark.parametrize("arguments", [["run"], ["resume"], ["status"], ["replay"], []])
-def test_every_command_has_help_with_an_example(arguments, capsys):
-    assert run(["campaign", *arguments, "--help"]) == 0
-    assert "Example:" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -169,6 +165,7 @@ def test_usage_errors_exit_2(arguments, capsys, tmp_path, monkeypatch):
     assert "Traceback" not in captured.err
 
 
+@pytest.mark.slow
 def test_a_campaign_tells_its_outcome_as_json_names_robot_and_world_and_is_quiet_when_asked(campaign, tmp_path, capsys):
     vary = '"fixture.offset_x" = { uniform = ["-30mm", "30mm"] }\n"start.tilt_z" = { choice = [0, "1deg"] }\n'
     out = str(tmp_path / "results")

@@ -34,6 +34,7 @@ def test_from_each_start_the_corner_is_reached_through_styrofoam_too():
     assert corner.good.all(), (corner.result.failure, corner.result.peak_force_n)
 
 
+@pytest.mark.figures
 def test_a_trial_in_contact_is_the_same_to_the_last_bit_alone_and_beside_another():
     skill = json.loads(SKILL.read_text(encoding="utf-8"))
     drawn = {

@@ -6,9 +6,10 @@ import re
 from pathlib import Path
 
 import pytest
+from skillframe_hydraulics.declared import noise_of, with_noise
 
 from skillframe.cli.main import run
-from skillframe.fmu.toolchain import find_compiler
+from skillframe.fmu.build import find_compiler
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot
 from tests.figures.crane_faults import KINDS, LIMIT, Struck, fine, own_reason, together, verdict
@@ -26,6 +27,7 @@ def trials():
     return list(together([(kind, i % 3, 1.2) for i, kind in enumerate(KINDS)], seed=4, seconds=2.0))
 
 
+@pytest.mark.figures
 def test_every_fault_ends_its_trial_within_a_fifth_of_a_second_by_its_own_reason_or_does_no_harm(trials):
     for one in trials:
         assert fine(one), one
@@ -42,7 +44,7 @@ def test_its_reason_names_the_part_that_broke(trials, kind):
 
 def test_the_rule_is_its_own_reason_within_a_fifth_of_a_second_or_limits_that_hold():
     """Of a stuck lift: named in time or late, by another part's name, unnoticed, and with what force until then."""
-    told = "watchdog: the valve of {} is told 5.0 mm in 0.1 s, and the piston does not move (at 1.4 s)"
+    told = "watchdog: the valve of {} is commanded 5.0 mm in 0.1 s, and the piston does not move (at 1.4 s)"
     cases = [
         ("watchdog", 0.2, 1e3, told.format("lift_piston"), "in time"),
         ("watchdog", 0.2, 2.0 * LIMIT, told.format("lift_piston"), "in time"),
@@ -63,7 +65,7 @@ def test_the_rule_is_its_own_reason_within_a_fifth_of_a_second_or_limits_that_ho
 def test_without_a_watch_a_burst_hose_drops_the_tool_on_the_plate():
     """What the watch is worth: 0.2 s of fall would be 5 kN and more; this one hits with all it has."""
     spec = load_robot("hiab_xs031")
-    blind = load_model(dataclasses.replace(spec, sensors=dataclasses.replace(spec.sensors, watch=False)))
+    blind = load_model(with_noise(spec, dataclasses.replace(noise_of(spec), watch=False)))
     (one,) = together([("burst a", 0, 0.5)], seed=4, seconds=1.5, robot=blind)
     assert one.ended in ("force", "true_force") and one.force > 3.0 * LIMIT
     assert not one.success
@@ -103,7 +105,4 @@ def test_a_campaign_draws_when_and_where_something_breaks_and_its_table_says_by_
     capsys.readouterr()
     words = ["run", str(SKILL), "--robot", "panda", "--world", "valley", "--set", "sensor.encoder_frozen=1"]
     assert run(words) == 2
-    assert (
-        "sensor.encoder_frozen: panda is no hydraulic machine, whose faults alone are simulated"
-        in capsys.readouterr().err
-    )
+    assert "sensor.encoder_frozen: panda has no drive with such a quantity; leave it out" in capsys.readouterr().err

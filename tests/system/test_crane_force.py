@@ -9,6 +9,7 @@ from tests.oracle.force_estimator import ForceEstimator
 
 
 @pytest.mark.slow
+@pytest.mark.figures
 def test_while_it_slides_the_estimate_is_good_to_two_and_a_half_percent_and_elsewhere_says_that_it_is_not():
     press = Press(case([1]), [1])
     log = press.run(LANDED + 4.0)

@@ -12,5 +12,6 @@ def test_the_crane_that_ships_stays_on_wood():
     assert pressed(1e6, mass=1.02, friction=0.8).lost == 0.0
 
 
+@pytest.mark.figures
 def test_one_with_encoders_of_twenty_bits_stays_on_five_times_that():
     assert pressed(5e6, robot=precise()).lost == 0.0

@@ -5,10 +5,10 @@ import shlex
 from itertools import pairwise
 
 import pytest
+from skillframe_reports.cuts import page as page_of
 
 from skillframe.cli.main import run
 from skillframe.extend.reading import write_demonstration
-from skillframe.reports.cuts import page as page_of
 from tests.browser import BROWSER, Tab
 from tests.figures import quasistatic as made
 

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from skillframe_testkit.suites import example_demonstrations
 
 from skillframe.cli.main import run
-from skillframe.document.source import learned
+from skillframe.document.file import learned
 from skillframe.extend.registry import registry
-from skillframe.testing import example_demonstrations
 from tests.oracle import edits
 
 pytestmark = pytest.mark.needs_plugins
@@ -57,7 +57,7 @@ def judged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Any:
             else ["--world", "free", "--robot", "free_tool"]
         )
         running = ["run", str(path), *where, "--duration", "0.02", "--out", str(tmp_path / "t.npz")]
-        for command in (["skill", "show", str(path)], running):
+        for command in (["show", str(path)], running):
             capsys.readouterr()
             codes.append(run(command))
             said = capsys.readouterr().err
@@ -85,7 +85,7 @@ def test_a_version_below_the_first_is_refused(document: Any, judged: Any, key: s
 def test_a_skill_file_with_a_byte_order_mark_is_read(document: Any, tmp_path: Path) -> None:
     path = tmp_path / "skill.json"
     path.write_text("\ufeff" + json.dumps(document("lmc")))
-    assert run(["skill", "show", str(path)]) == 0
+    assert run(["show", str(path)]) == 0
 
 
 @pytest.mark.slow

@@ -33,6 +33,7 @@ SAYS = {
 @pytest.mark.slow
 @pytest.mark.needs_plugins
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda p: p.stem)
+@pytest.mark.figures
 def test_an_example_runs_says_what_it_found_and_draws_it(script, tmp_path):
     command = [sys.executable, "-W", "ignore::UserWarning", script, "--quick", "--out", tmp_path]
     environment = {**os.environ, "MPLBACKEND": "Agg"}

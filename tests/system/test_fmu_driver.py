@@ -9,9 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from skillframe.fmu.build import find_compiler, find_fmu
 from skillframe.fmu.inspection import inspect_fmu
-from skillframe.fmu.library import find_fmu
-from skillframe.fmu.toolchain import find_compiler
 from tests.benchmarks.driver import H, bank
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(find_compiler() is None, reason="no C compiler")]

@@ -26,7 +26,7 @@ def sound(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     assert PLAIN.keys() <= any_style(rng).keys()
     files = {ending: write(recording, folder, "demo", {**PLAIN, "ending": ending}, rng) for ending in (".csv", ".npz")}
     for path in files.values():
-        assert run(["demonstration", "check", str(path)]) == 0
+        assert run(["check", str(path)]) == 0
     return files
 
 
@@ -37,9 +37,9 @@ def refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Read:
     def demand(path: Path) -> None:
         out = tmp_path / "out.npz"
         commands = [
-            ["demonstration", "check"],
-            ["demonstration", "convert", "--out", str(out)],
-            ["condition", "--out", str(out)],
+            ["check"],
+            ["convert", "--out", str(out)],
+            ["filter", "--out", str(out)],
         ]
         for command in commands:
             capsys.readouterr()
@@ -66,6 +66,7 @@ def test_a_table_damaged_in_its_cells_is_refused(
 
 
 @pytest.mark.parametrize("how", damage.BYTES)
+@pytest.mark.slow
 def test_a_file_that_is_no_table_is_refused(sound: dict[str, Path], refused: Read, tmp_path: Path, how: str) -> None:
     path = tmp_path / "demo.csv"
     path.write_bytes(damage.BYTES[how](sound[".csv"].read_text()))

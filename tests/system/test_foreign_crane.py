@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from skillframe.execution.executor import Setup, simulate
-from skillframe.fmu.library import find_fmu
-from skillframe.fmu.toolchain import find_compiler
+from skillframe.fmu.build import find_compiler, find_fmu
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import Limits, load_robot
 from tests.fmu_cache import own_cache  # noqa: F401

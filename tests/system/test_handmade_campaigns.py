@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from skillframe_testkit.suites import example_demonstrations
 
 from skillframe.cli.main import run
-from skillframe.document.file import save
-from skillframe.document.source import learned
+from skillframe.document.file import learned, save
 from skillframe.extend.registry import registry
-from skillframe.testing import example_demonstrations
 
 pytestmark = pytest.mark.needs_plugins
 TEXT = """
@@ -29,8 +28,8 @@ SLIPS = {
         "[-45, 45]",
         "start.tilt_y: -45 rad is beyond -90deg to 90deg, as what leans more lies upside down; did you mean -45deg?",
     ),
-    "a quantity of machines": ("start.tilt_y", "actuator.supply_pressure", "free_tool has no actuators of its own"),
-    "a payload of none": ("start.tilt_y", "robot.payload", "the robot declares no payload"),
+    "a quantity of machines": ("start.tilt_y", "actuator.supply_pressure", "free_tool has no drive with such"),
+    "a payload of none": ("start.tilt_y", "robot.payload", "free_tool declares no payload"),
     "noise below zero": ("start.tilt_y", "sensor.force_noise", "sensor.force_noise: -0.2 N is beyond 0N to 100N"),
     "beyond all machines": ("[-0.2, 0.2]", "[0, 1e9]", "start.tilt_y: 1e+09 rad is beyond -90deg to 90deg"),
     "metres": ("start.tilt_y", 'start.offset_x" = { choice = [5] }\n"start.tilt_y', "did you mean 5mm?"),
@@ -46,7 +45,11 @@ SLIPS = {
     ),
     "a piece of a world": ("[vary]", "[set]\nworld.radius = 5\n[vary]", "radius: 5 m is beyond 0.1mm to 0.2m; did you"),
     "a far centre": ("seed = 7", 'seed = 7\ncoc = "10,0,0"', "point 10,0,0: x: 10 m is beyond -3m to 3m"),
-    "no group": ("start.tilt_y", "tilt", "unknown quantity 'tilt'; did you mean 'start.tilt_z'? (there are: start.*"),
+    "no group": (
+        "start.tilt_y",
+        "tilt",
+        "did you mean 'start.tilt_z'? (there are: actuator.*, fault.*, fixture.*, grasp.*, robot.*, sensor.*, start.*",
+    ),
     "twice": ("[vary]", "[vary.start]\ntilt_y = { grid = [0.1, 0.2] }\n[vary]", "vary.start.tilt_y: is written twice"),
     "a skill cut off": ("push.skill", "cut.skill", "cut.skill.json: is cut off at line 1"),
     "one skill, no list": ('["push.skill.json"]', "'push.skill.json'", "campaign.skills: expected a list"),
@@ -54,9 +57,16 @@ SLIPS = {
 MACHINE = {"free_tool": "hiab_xs031", "valley": "pallets", "start.tilt_y": "actuator.delay", "[-0.2, 0.2]": "[0, 5]"}
 
 
+@pytest.fixture(scope="module")
+def push(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    path = tmp_path_factory.mktemp("skill") / "push.skill.json"
+    save(learned(registry().skill("lmc"), example_demonstrations()), path)
+    return path.read_bytes()
+
+
 @pytest.fixture
-def campaign(tmp_path: Path) -> Path:
-    save(learned(registry().skill("lmc"), example_demonstrations()), tmp_path / "push.skill.json")
+def campaign(push: bytes, tmp_path: Path) -> Path:
+    (tmp_path / "push.skill.json").write_bytes(push)
     (tmp_path / "cut.skill.json").write_text('{"format": "skillframe.skill", "ver')
     return tmp_path / "c.toml"
 
@@ -90,6 +100,6 @@ def test_a_delay_in_milliseconds_is_refused_before_anything_is_made(
         text = text.replace(old, new)
     campaign.write_text(text)
     assert run(["campaign", "run", str(campaign), "--out", str(campaign.parent / "out")]) == 2
-    words = "actuator.delay: 5 s is beyond 0s to 1s, as buses and valves take milliseconds; did you mean 5ms?"
+    words = "actuator.delay: 5 s is beyond 0s to 1s, as buses and actuators take milliseconds; did you mean 5ms?"
     assert words in capsys.readouterr().err
     assert not (campaign.parent / "out").exists()

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from skillframe.cli.main import run
+from skillframe.fmu.build import find_compiler
 from skillframe.fmu.extract import unpack
-from skillframe.fmu.toolchain import find_compiler
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.oracle import fmus
 from tests.oracle.attacks import processes
@@ -82,7 +82,7 @@ def test_every_kind_of_variable_acts_as_in_the_closed_form_and_as_by_fmpy(said, 
 
 
 def test_arrays_aliases_and_wide_integers_of_fmi_3_are_those_of_fmpy(said, lag, tmp_path):
-    assert json.loads(said("check", lag[3], "--json")[1])["problems"] == []  # an alias has no entry of its own
+    assert json.loads(said(lag[3], "--json")[1])["problems"] == []  # an alias has no entry of its own
     ours = simulated(said, lag[3], tmp_path / "o.csv", "--set", "u=1", "--set", "w=[1, 2, 0.5]", "--set", "small=-128")
     theirs = by_fmpy(lag[3], {"u": 1.0, "w": [1.0, 2.0, 0.5], "small": -128}, stop=1, step=0.1)
     x = np.array(theirs["x"]).reshape(11, 6)
@@ -160,14 +160,14 @@ def test_odd_names_and_folders_of_resources_come_through(said, tmp_path):
     description = fmus.describe(out="größe.out[1,2] &quot;a&quot;")
     path = tmp_path / "näme mit space.fmu"
     fmus.pack(path, description, fmus.library(tmp_path / "c", RESOURCE="1"), members=members)
-    assert said("check", path)[0] == 0
+    assert said(path)[0] == 0
     assert simulated(said, path, tmp_path / "o.csv")['größe.out[1,2] "a"'][0] == "10.5"
 
 
 ENDS = {
     "crash when freed": ("ON_FREE=abort();", r"crashed \(SIGABRT\) while being freed after its last step; 11 rows", 12),
     "hang when ended": ("ON_END=for(;;)sleep(1);", "did not answer within 2 s while being freed after .*; 11 rows", 12),
-    "wants to end": ("ON_STEP=if(t>0.45)return fmi2Discard;", "asked to end at 0.5 s; 7 rows", 8),
+    "wants to end": ("ON_STEP=if(t>0.45)return fmi2Discard;", "terminated the simulation at 0.5 s; 7 rows", 8),
     "no known signal": ("ON_STEP=raise(40);", r"crashed \(signal 40\)", 2),
     "one row": ("ON_STEP=return fmi2Error;", "failed at 0 s: .*; 1 row is in", 2),
 }
@@ -214,7 +214,7 @@ XML = {
 def test_a_description_that_is_wrong_is_refused_in_words_for_people(said, tmp_path, how):
     change, words = XML[how]
     path = fmus.pack(tmp_path / "bad.fmu", change(fmus.describe()))
-    code, out, err = said("check", path)
+    code, out, err = said(path)
     assert code == (1 if how == "no interface" else 2) and words in out + err, out + err
     assert "NoneType" not in err and "int()" not in err and "list index" not in err
 
@@ -230,10 +230,10 @@ def test_archives_that_cannot_be_unpacked_say_so_and_leave_nothing(said, tmp_pat
     damaged[60:80] = bytes(20)
     for data, words in ((locked, "password"), (unusual, "unusual way"), (damaged, "cannot be unpacked")):
         (tmp_path / "bad.fmu").write_bytes(data)
-        code, _, err = said("check", tmp_path / "bad.fmu")
+        code, _, err = said(tmp_path / "bad.fmu")
         assert code == 2 and words in err, err
     long = fmus.pack(tmp_path / "long.fmu", fmus.describe(), members=[("resources/" + "d/" * 3000 + "f", "")])
-    code, _, err = said("check", long)
+    code, _, err = said(long)
     assert code == 2 and "holds a name of 6011 characters" in err
 
 
@@ -265,8 +265,8 @@ def test_a_model_identifier_that_leads_elsewhere_is_refused(said, tmp_path):
     listed = fmus.describe(sources='<SourceFiles><File name="lag.c"/></SourceFiles>')
     listed = listed.replace('modelIdentifier="lag"', 'modelIdentifier="../../evil"')
     path = fmus.pack(tmp_path / "bad.fmu", listed, members=[("sources/lag.c", fmus.source())])
-    for command in ("check", "build"):
-        code, _, err = said(command, path)
+    for command in ((), ("build",)):
+        code, _, err = said(*command, path)
         assert code == 2 and "model identifier '../../evil', which is no name of a file" in err
 
 
@@ -312,8 +312,12 @@ def described(count, version=2):
 @pytest.mark.parametrize(("version", "count"), [(2, 600_010), (3, 600_008)])  # its own are 10 and 8
 def test_a_description_without_end_is_refused_before_it_is_read(said, tmp_path, version, count):
     path = fmus.pack(tmp_path / "many.fmu", described(600_000, version))
-    for more in (("check",), ("simulate", "--stop", 1, "--step", 0.1, "--out", tmp_path / "o.csv"), ("build",)):
-        code, _, err = said(more[0], path, *more[1:])
+    for words in (
+        (path,),
+        ("simulate", path, "--stop", 1, "--step", 0.1, "--out", tmp_path / "o.csv"),
+        ("build", path),
+    ):
+        code, _, err = said(*words)
         assert code == 2 and f"describes {count} variables, where 100000 are the most" in err, err
 
 
@@ -326,8 +330,8 @@ def test_a_large_description_is_read_in_a_child_and_its_names_are_there(said, tm
 def test_a_file_of_zeros_is_refused_and_nothing_stays_in_the_cache(said, tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     path = fmus.pack(tmp_path / "zeros.fmu", fmus.describe(), members=[("resources/0", bytes(300_000_000))])
-    for more in (("check",), ("simulate", "--stop", 1, "--step", 0.1, "--out", tmp_path / "o.csv")):
-        code, _, err = said(more[0], path, *more[1:])
+    for words in ((path,), ("simulate", path, "--stop", 1, "--step", 0.1, "--out", tmp_path / "o.csv")):
+        code, _, err = said(*words)
         assert code == 2 and "bytes that unpack to 300000000; do not trust this file" in err, err
     assert not [p for p in (tmp_path / "cache").rglob("*") if p.is_file()]
 
@@ -336,10 +340,11 @@ def test_a_file_of_zeros_is_refused_and_nothing_stays_in_the_cache(said, tmp_pat
 def test_what_was_unpacked_of_an_fmu_that_does_not_load_is_removed(said, tmp_path, monkeypatch, command):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     path = fmus.pack(tmp_path / "none.fmu", fmus.describe(), b"no library")
-    more = () if command == "check" else ("--stop", 1, "--step", 0.1, "--out", tmp_path / "o.csv")
-    code, out, err = said(command, path, *more)
+    simulate = ("simulate", path, "--stop", 1, "--step", 0.1, "--out", tmp_path / "o.csv")
+    words = (path,) if command == "check" else simulate
+    code, out, err = said(*words)
     assert code == 1 and "does not load" in out + err
     assert not [p for p in (tmp_path / "cache").rglob("*") if p.is_file()]
     kept = unpack(path)  # as a campaign does that runs it
-    assert said(command, path, *more)[0] == 1
+    assert said(*words)[0] == 1
     assert (kept / "modelDescription.xml").is_file()

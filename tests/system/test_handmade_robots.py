@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from skillframe_testkit.suites import example_demonstrations
 
 from skillframe.cli.main import run
 from skillframe.document.file import save
-from skillframe.testing import example_demonstrations
 
 LINK = """<link name="{}"><inertial><origin xyz="0 0 .1"/><mass value="1"/>
 <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.005"/></inertial></link>"""
@@ -46,8 +46,8 @@ SLIPS = {
     ),
     "friction of no joint": (("[limits]", "[friction_share]\njx = 1\n[limits]"), "named in rt's [friction_share]"),
     "friction below zero": (("[limits]", "[friction_share]\nj1 = -1\n[limits]"), "friction_share.j1: is -1"),
-    "no attitude": (("[limits]", "[workspace]\nattitude = [0, 0, 0, 0]\n[limits]"), "has the length 0, not 1"),
-    "w, x, y, z too long": (("[limits]", "[workspace]\nattitude = [1, 0, 0, 1]\n[limits]"), "a unit quaternion"),
+    "no attitude": (("[limits]", "[workspace]\norientation = [0, 0, 0, 0]\n[limits]"), "has the length 0, not 1"),
+    "w, x, y, z too long": (("[limits]", "[workspace]\norientation = [1, 0, 0, 1]\n[limits]"), "a unit quaternion"),
     "infinitely far": (("[limits]", "[workspace]\nfixture = [inf, 0, 0]\n[limits]"), "inf m is beyond -100m to 100m"),
 }
 UNUSABLE = {
@@ -82,15 +82,15 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
 def test_a_slip_in_robot_toml_is_found_before_any_run(
     robot: Path, capsys: pytest.CaptureFixture[str], how: str
 ) -> None:
-    assert run(["robots", "check", str(robot)]) == 0
+    assert run(["robots", "--check", str(robot)]) == 0
     (old, new), words = SLIPS[how]
     (robot / "robot.toml").write_text(TOML.replace(old, new))
-    assert words in refused(capsys, "robots", "show", robot)
+    assert words in refused(capsys, "robots", robot)
 
 
 def test_a_robot_toml_with_a_byte_order_mark_is_read(robot: Path) -> None:
     (robot / "robot.toml").write_text("\ufeff" + TOML.replace("\n", "\r\n"), newline="")
-    assert run(["robots", "check", str(robot)]) == 0
+    assert run(["robots", "--check", str(robot)]) == 0
 
 
 @pytest.mark.needs_plugins
@@ -98,7 +98,7 @@ def test_a_robot_toml_with_a_byte_order_mark_is_read(robot: Path) -> None:
 def test_a_robot_that_no_simulator_can_hold_is_refused_by_run_too(
     robot: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], how: str
 ) -> None:
-    from skillframe.document.source import learned
+    from skillframe.document.file import learned
     from skillframe.extend.registry import registry
 
     skill, trace = tmp_path / "s.skill.json", tmp_path / "t.npz"

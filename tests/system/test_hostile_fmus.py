@@ -16,13 +16,12 @@ import numpy as np
 import pytest
 
 from skillframe.execution.trace import Trace
+from skillframe.files import cache_dir
 from skillframe.fmu.actuator import ActuatorSpec
-from skillframe.fmu.build import build_fmu
+from skillframe.fmu.build import build_fmu, find_compiler
 from skillframe.fmu.child import Child, SandboxLimits
 from skillframe.fmu.inspection import inspect_fmu
 from skillframe.fmu.sandbox import SandboxBank
-from skillframe.fmu.toolchain import find_compiler
-from skillframe.paths import cache_dir
 from tests.fmu_cache import own_cache  # noqa: F401
 from tests.oracle import fmus
 from tests.oracle.attacks import ATTACKS, SECRET, processes, written
@@ -33,7 +32,7 @@ LIMIT_S = 3.0
 PATIENCE_S = 90.0  # far above any time limit here: what is not done by then hangs
 COMMANDS = {
     "check": "import sys; from skillframe.fmu import check as c; from skillframe.cli.main import run;"
-    f"c.LIMITS = type(c.LIMITS)(start_s={LIMIT_S}); sys.exit(run(['fmu', 'check', *sys.argv[1:]]))",
+    f"c.LIMITS = type(c.LIMITS)(start_s={LIMIT_S}); sys.exit(run(['fmu', *sys.argv[1:]]))",
     "simulate": "import sys; from skillframe.cli.main import run;"
     f"sys.exit(run(['fmu', 'simulate', *sys.argv[1:], '--stop', '0.02', '--step', '0.001', '--timeout', '{LIMIT_S}',"
     "'--out', sys.argv[1] + '.csv']))",
@@ -113,6 +112,7 @@ def nothing_is_left(mark, landlock=True):
 
 
 @pytest.mark.parametrize(("name", "command"), BOTH)
+@pytest.mark.slow
 def test_an_fmu_that_attacks_ends_in_a_sentence_and_leaves_nothing(mark, confined, name, command):
     if "kills" in name and not confined["namespace"]:
         pytest.skip("this system gives no process namespace: an FMU can end what belongs to the same user")
@@ -200,6 +200,7 @@ def test_a_process_that_a_list_of_processes_misses_is_ended_all_the_same(tmp_pat
     assert code == 0 and int(out.split()[0]) > 1 and out.split(maxsplit=1)[1].strip() == "[]", out + err
 
 
+@pytest.mark.slow
 def test_a_forged_number_in_the_loop_ends_its_own_instance_with_a_sentence(mark):
     """Two actuators: the second one writes an answer of its own with a force that is no number."""
     banks = [fmus.pack(mark / "good.fmu", fmus.describe(), fmus.library(mark / "good"))]
@@ -296,12 +297,12 @@ WEIGHED = (
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("command", "more"),
-    [("check", ()), ("simulate", ("--stop", "1", "--step", "0.1", "--out", "o.csv")), ("build", ())],
+    [((), ()), (("simulate",), ("--stop", "1", "--step", "0.1", "--out", "o.csv")), (("build",), ())],
 )
 def test_a_description_of_600_000_variables_costs_this_process_neither_time_nor_memory(mark, command, more):
     """Read here it took two minutes and 2 GB. Importing and asking a child takes some 100 MB and a second."""
     path = zipped(mark / "big.fmu", HEAD + "".join(VARIABLE % (i, i) for i in range(600_000)) + TAIL)
-    code, out, err, seconds = ended_in(mark, WEIGHED, command, path, *more)
+    code, out, err, seconds = ended_in(mark, WEIGHED, *command, path, *more)
     assert code == 2 and "describes 600000 variables, where 100000 are the most" in err
     # below a fifth of what it took; this machine may be busy
     assert int(out.rpartition("MB ")[2]) < 400 and seconds < 24.0
@@ -321,7 +322,7 @@ def test_a_zip_of_zeros_is_refused_and_nothing_of_it_reaches_the_cache(mark, mon
     monkeypatch.setenv("XDG_CACHE_HOME", str(mark / "cache"))  # other tests fill the one that all share
     path = zipped(mark / "zeros.fmu", HEAD + VARIABLE % (0, 0) + TAIL, resources)
     before = set(cache_dir("fmus-unpacked").iterdir())
-    code, _, err, _ = ended_in(mark, WEIGHED, "check", path)
+    code, _, err, _ = ended_in(mark, WEIGHED, path)
     assert code == 2 and words in err
     assert set(cache_dir("fmus-unpacked").iterdir()) == before
     assert path.stat().st_size < 3_000_000

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from manifold3d import Manifold
+from skillframe_parts.declared import DENSITY, read_fixture
+from skillframe_parts.found import lines
+from skillframe_parts.load import load
+from skillframe_parts.second_declared import SecondPart
+from skillframe_parts.solid import arrays_of
 
 from skillframe import Campaign, learn, record, run
 from skillframe.cli.main import run as typed
-from skillframe.parts.declared import DENSITY, read_fixture
-from skillframe.parts.found import lines
-from skillframe.parts.load import load
-from skillframe.parts.second_declared import SecondPart
-from skillframe.parts.solid import arrays_of
 from tests import part_meshes
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "how-to" / "own-parts.md").read_text(encoding="utf-8")

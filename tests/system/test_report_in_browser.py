@@ -6,15 +6,12 @@ import re
 import shutil
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "unit" / "reports"))
-from report_fakes import campaign, trace
+from skillframe_reports.page import write_report
 
 from skillframe.cli.main import run
-from skillframe.reports.page import write_report
+from tests.report_fakes import campaign, trace
 
 BROWSER = next((b for b in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if b), None)
 FLAGS = ["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync",
@@ -89,10 +86,11 @@ def test_a_browser_without_webgl_says_so_and_shows_the_rest(tmp_path):
     assert "This browser has no WebGL" in dom
 
 
+@pytest.mark.slow
 def test_a_report_with_stills_needs_neither_opengl_nor_the_simulator(tmp_path):
     trace().save(tmp_path / "run.npz")
     code = (
-        "import sys; from pathlib import Path; from skillframe.reports.page import write_report;"
+        "import sys; from pathlib import Path; from skillframe_reports.page import write_report;"
         f"write_report([Path({str(tmp_path / 'run.npz')!r})], Path({str(tmp_path / 'r.html')!r}));"
         "print(sorted({'mujoco', 'OpenGL', 'pinocchio', 'matplotlib'} & set(sys.modules)))"
     )
@@ -105,6 +103,7 @@ def test_a_report_with_stills_needs_neither_opengl_nor_the_simulator(tmp_path):
     assert "without OpenGL, as a shaded wireframe" in page
 
 
+@pytest.mark.slow
 def test_the_command_writes_the_file_and_says_where(tmp_path, monkeypatch, capsys):
     trace().save(tmp_path / "run.npz")
     monkeypatch.chdir(tmp_path)

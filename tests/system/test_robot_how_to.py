@@ -9,13 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from skillframe_hydraulics.declared import Gains, MachineNoise
+from skillframe_hydraulics.law.vdc_actuator import cylinders
 
 from skillframe.errors import InputError
-from skillframe.machine.checks.audit import audit
-from skillframe.machine.law.vdc_actuator import cylinders
-from skillframe.robot.driven import Actuation, Gains, MachineNoise
+from skillframe.extend.drives import audit
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot, robot_names
+from skillframe.robot.tables import Actuation
 
 DOCS = Path(__file__).resolve().parents[2] / "docs" / "how-to"
 CRANE, ROBOT = ((DOCS / f"own-{name}.md").read_text(encoding="utf-8") for name in ("crane", "robot"))
@@ -47,7 +48,7 @@ def crane(tmp_path):
 
 
 def test_the_blocks_of_the_crane_page_make_a_crane_with_nothing_to_warn_of(crane):
-    spec = crane("lift_rod_eye", 'fmu = "hydraulic_cylinder"', "[payload]", "[limits]")
+    spec = crane('fmu = "hydraulic_cylinder"', "[payload]", "[limits]")
     assert audit(spec).problems == ()
     mine, shipped = (cylinders(robot.actuation) for robot in (spec, load_robot("hiab_xs031")))
     for field in fields(mine):  # the page rounds the flow to 1.67e-3 m3/s, by 0.2 %

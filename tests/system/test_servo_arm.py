@@ -11,7 +11,7 @@ from skillframe.cli.main import run
 from skillframe.execution.executor import simulate
 from skillframe.execution.prepare import load_robot_model, load_world, prepare
 from skillframe.extend.reading import read_demonstration
-from skillframe.fmu.toolchain import find_compiler
+from skillframe.fmu.build import find_compiler
 
 pytestmark = [
     pytest.mark.slow, pytest.mark.needs_plugins,
@@ -27,7 +27,7 @@ def skill(tmp_path_factory):
     folder = tmp_path_factory.mktemp("skill")
     demonstrations = folder / "peg.npz"
     world = ["--world", "peg_in_hole", "--robot", "panda", "--teacher", "kinesthetic", "--count", "2", "--seed", "1"]
-    assert run(["demonstration", "record", *world, "--out", str(demonstrations)]) == 0
+    assert run(["record", *world, "--out", str(demonstrations)]) == 0
     files = sorted(str(path) for path in folder.glob("peg*.npz"))
     assert run(["learn", *files, "--at", "tip", "--out", str(folder / "peg.skill.json")]) == 0
     return folder / "peg.skill.json"
@@ -48,6 +48,7 @@ def told(name, result):
     return f"{name} | {np.count_nonzero(result.success)} of {COUNT} | {np.median(force):.1f} N | {force.max():.1f} N"
 
 
+@pytest.mark.figures
 def test_servos_without_friction_to_speak_of_do_what_ideal_torques_do(skill):
     """With a tenth of the friction the goal is reached as closely, and no limit is broken."""
     ideal, light = tried(skill, "panda"), tried(skill, "panda_servo", 0.1)
@@ -56,6 +57,7 @@ def test_servos_without_friction_to_speak_of_do_what_ideal_torques_do(skill):
     np.testing.assert_allclose(light.final_error_m, ideal.final_error_m, atol=2e-4)
 
 
+@pytest.mark.figures
 def test_friction_in_the_gears_costs_successes_and_a_position_servo_has_less_of_it(skill):
     torque, position = tried(skill, "panda_servo"), tried(skill, "panda_position")
     print(told("panda_servo", torque), told("panda_position", position), sep="\n")
@@ -67,7 +69,7 @@ def test_friction_in_the_gears_costs_successes_and_a_position_servo_has_less_of_
 @pytest.mark.parametrize("robot", ["panda_servo", "panda_position"])
 def test_arms_of_servos_are_led_by_hand_into_the_hole_without_a_failed_attempt(robot, tmp_path, capsys):
     """A hand that cannot overcome the gears' friction leaves the peg on its rim until the time is over."""
-    words = f"demonstration record --world peg_in_hole --robot {robot} --count 2 --seed 1 --json --out".split()
+    words = f"record --world peg_in_hole --robot {robot} --count 2 --seed 1 --json --out".split()
     assert run([*words, str(tmp_path / "d.npz")]) == 0
     said = json.loads(capsys.readouterr().out)
     assert said["rejected"] == []
@@ -75,9 +77,14 @@ def test_arms_of_servos_are_led_by_hand_into_the_hole_without_a_failed_attempt(r
         assert read_demonstration(Path(file)).duration < 12.0
 
 
-@pytest.mark.parametrize("option", ["--angle=5", "--force-scale=2"])
-def test_options_of_machines_are_refused_for_an_arm_of_servos_by_name(option, tmp_path, capsys):
-    words = f"demonstration record --world peg_in_hole --robot panda_servo {option} --out".split()
+@pytest.mark.parametrize(
+    ("words", "refused"),
+    [
+        ("--angle=5", "angle: is for machines that are taught by an operator, and panda_servo is not"),
+        ("--set teacher.force_scale=2", "--set teacher: unknown key 'force_scale'"),
+    ],
+)
+def test_settings_of_machines_are_refused_for_an_arm_of_servos(words, refused, tmp_path, capsys):
+    words = f"record --world peg_in_hole --robot panda_servo {words} --out".split()
     assert run([*words, str(tmp_path / "d.npz")]) == 2
-    refused = f"{option.partition('=')[0]}: is for hydraulic machines, which panda_servo is not"
     assert refused in capsys.readouterr().err

@@ -14,11 +14,12 @@ PAIRS = [(robot, world) for robot in ARMS for world in WORLDS]
 
 
 @pytest.mark.parametrize(
-    ("robot", "world"), [*PAIRS, ("ur5e_position", "hose_coupler"), ("ur5e_velocity", "peg_in_hole")]
+    ("robot", "world"), [*PAIRS, ("ur5e_torque", "hose_coupler"), ("ur5e_velocity", "peg_in_hole")]
 )
+@pytest.mark.figures
 def test_a_shipped_arm_is_taught_and_does_what_it_was_taught(robot, world, tmp_path, capsys):
     on = ["--world", world, "--robot", robot]
-    recorded = ["demonstration", "record", *on, "--count", "2", "--seed", "1", "--out", str(tmp_path / "d.npz")]
+    recorded = ["record", *on, "--count", "2", "--seed", "1", "--out", str(tmp_path / "d.npz")]
     assert run(recorded) == 0
     skill = tmp_path / "s.skill.json"
     files = [str(tmp_path / f"d{i}.npz") for i in (1, 2)]

@@ -145,9 +145,9 @@ def test_importing_the_installed_package_loads_nothing_but_itself_and_python(typ
     assert {name.partition(".")[0] for name in loaded} <= {"skillframe", *sys.stdlib_module_names}
 
 
-def test_the_quickstart_works_in_an_empty_folder_from_wheels_alone(typed, tmp_path):
+def test_the_demo_works_in_an_empty_folder_from_wheels_alone(typed, tmp_path):
     few = ["--robot", "free_tool", "--trials", "2", "--rate", "0.5", "--workers", "1", "--json"]
-    code, said, told = typed("-m", "skillframe.cli.main", "quickstart", "--out", "demo", *few)
+    code, said, told = typed("-m", "skillframe.cli.main", "demo", "--out", "demo", *few)
     assert code == 0, told
     assert [p.name for p in tmp_path.iterdir()] == ["demo"]
     assert (tmp_path / json.loads(said)["report"]).stat().st_size > 100_000
@@ -156,6 +156,6 @@ def test_the_quickstart_works_in_an_empty_folder_from_wheels_alone(typed, tmp_pa
 
 def test_the_installed_package_finds_its_robots_and_its_fmus(typed):
     for words, names in ((["robots"], ["panda", "hiab_xs031"]), (["fmu"], ["hydraulic_cylinder", "electric_servo"])):
-        code, said, told = typed("-m", "skillframe.cli.main", *words, "list")  # FMUs, built or not
+        code, said, told = typed("-m", "skillframe.cli.main", *words)  # FMUs, built or not
         assert code == 0, told
         assert all(name in said for name in names)

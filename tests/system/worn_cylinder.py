@@ -9,11 +9,11 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+from skillframe_hydraulics.cylinder.bank import instance_parameters
+
 from skillframe.campaign.sampling import draws
 from skillframe.campaign.spec import CampaignSpec
-from skillframe.fmu.build import build_fmu
-from skillframe.fmu.library import fmu_folders
-from skillframe.machine.cylinder.bank import instance_parameters
+from skillframe.fmu.build import build_fmu, fmu_folders
 from skillframe.robot.spec import load_robot
 from tests.crane_corner import SKILL
 

@@ -28,8 +28,8 @@ def recipe(target):
     return [line.strip().replace("$(BIN)/", "") for line in lines.splitlines()]
 
 
-def test_there_are_ten_distributions():
-    assert len(PROJECTS) == 10
+def test_there_are_twenty_two_distributions():
+    assert len(PROJECTS) == 22
 
 
 def test_all_are_installed_for_every_day_but_what_drags_lerobot_in():

@@ -36,7 +36,8 @@ def test_every_hook_of_the_specification_is_one_that_the_registry_calls():
 @pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda code: re.search(r"def (skillframe_\w+)", code).group(1))
 def test_every_example_of_a_hook_loads_and_conforms(example, monkeypatch, tmp_path):
-    from skillframe.conformance import check_plugin
+    from skillframe_testkit.checks import check_plugin
+
     from skillframe.robot import load_robot
 
     module = types.ModuleType("example_plugin")
@@ -89,14 +90,13 @@ def test_every_evidence_page_names_its_command_and_is_linked_both_ways_with_an_e
     assert pages
     for page in pages:
         text = page.read_text(encoding="utf-8")
-        assert re.search(r"make (figures|bench|mutants)|pytest", text), page.name
+        assert re.search(r"make (figures|bench|mutants)|pytest|python -m tests\.figures", text), page.name
         sources = re.findall(r"\.\./((?:explanation|how-to)/[\w-]+\.md)", text)
         assert any(f"../evidence/{page.name}" in explained[source] for source in sources), page.name
 
 
 def test_explanations_of_how_it_works_hold_no_seeds():
-    found = [p.name for p in (DOCS / "explanation").glob("*.md") if re.search(r"[Ss]eeds? \d", p.read_text("utf-8"))]
-    assert found in ([], ["reproduced.md"])  # the page that `skillframe reproduce` writes is a table of evidence itself
+    assert not [p.name for p in (DOCS / "explanation").glob("*.md") if re.search(r"[Ss]eeds? \d", p.read_text("utf-8"))]
 
 
 def test_maths_in_the_pages_is_marked_as_the_builder_reads_it():
@@ -117,6 +117,11 @@ def commands():
     return dict(below([], cli))
 
 
+def parameters(command):
+    """What a command takes, options of plug-ins included."""
+    return command.get_params(click.Context(command))
+
+
 def shown():
     """(place, line) of every command line that help texts, pages and the change log show, in blocks and sentences."""
     pages = [*DOCS.rglob("*.md"), DOCS.parent / "README.md", *DOCS.parent.glob("plugins/*/README.md")]
@@ -133,6 +138,7 @@ def shown():
 
 
 @pytest.mark.needs_plugins
+@pytest.mark.slow
 def test_every_command_line_that_is_shown_names_a_command_and_options_that_exist():
     known = commands()
     assert not [f"{place}: {problem}" for place, line in shown() if (problem := problem_of(line.split(), known))]
@@ -144,6 +150,17 @@ def problem_of(parts, known):
         name = f"{name} {parts.pop(0)}".strip()
     if not name:
         return f"there is no command in '{' '.join(parts)}'"
-    options = {o for p in known[name].params for o in [*p.opts, *p.secondary_opts]} | {"--help"}
+    options = {o for p in parameters(known[name]) for o in [*p.opts, *p.secondary_opts]} | {"--help"}
     unknown = [part for part in parts if part.startswith("--") and part.partition("=")[0] not in options]
     return f"'{name}' has no {', '.join(unknown)}" if unknown else ""
+
+
+def test_every_link_of_a_readme_leads_to_a_file():
+    """Sphinx checks those of the docs."""
+    broken = [
+        f"{page.relative_to(DOCS.parent)}: {link}"
+        for page in [*DOCS.parent.glob("*.md"), *DOCS.parent.glob("plugins/*/README.md")]
+        for link in re.findall(r"\]\(([^)#\s]+)", page.read_text(encoding="utf-8"))
+        if not re.match(r"[a-z]+:", link) and not (page.parent / link).exists()
+    ]
+    assert not broken

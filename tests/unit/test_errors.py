@@ -29,3 +29,10 @@ def test_of_two_names_with_one_beginning_the_nearer_whole_is_suggested():
 
 def test_nothing_is_suggested_where_there_is_nothing():
     assert suggest("valley", []) is None
+
+
+def test_many_names_in_groups_are_listed_by_their_groups():
+    groups = [f"{group}.{i}" for group in "abc" for i in range(20)]
+    assert str(UnknownName("quantity", "z", groups)) == "unknown quantity 'z' (there are: a.*, b.*, c.*)"
+    files = [f"{i}.json" for i in range(40)]
+    assert "0.json, 1.json" in str(UnknownName("file", "z", files))

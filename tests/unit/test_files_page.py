@@ -5,8 +5,11 @@ import re
 import typing
 from pathlib import Path
 
+import pytest
+
 from skillframe.campaign.rows import columns
 from skillframe.campaign.spec import CampaignSpec, RaceKeys
+from skillframe.extend.registry import registry
 from skillframe.robot.spec import RobotFile
 
 PAGE = (Path(__file__).resolve().parents[2] / "docs" / "reference" / "files.md").read_text(encoding="utf-8")
@@ -29,12 +32,22 @@ def records(hint):
             yield from records(each)
 
 
+def of_drives():
+    """The dataclass of each table of robot.toml that the drive of a plug-in reads, by its name."""
+    tables = [record.tables() for record in registry().records("drive") if record.tables is not None]
+    return {name: kind for table in tables for name, kind in table.items()}
+
+
+@pytest.mark.needs_plugins
 def test_every_key_of_robot_toml_is_on_the_page_and_no_other():
-    assert sorted(first_cells("Robot")) == sorted(field.name for field in dataclasses.fields(RobotFile))
+    own = [field.name for field in dataclasses.fields(RobotFile)]
+    assert sorted(first_cells("Robot")) == sorted([*own, *of_drives()])
 
 
 def test_every_table_of_robot_toml_is_on_the_page_in_detail():
-    found = {f"{each.__module__}.{each.__name__}" for each in records(RobotFile)} - {"skillframe.robot.spec.RobotFile"}
+    kinds = [RobotFile, *of_drives().values()]
+    found = {f"{each.__module__}.{each.__name__}" for kind in kinds for each in records(kind)}
+    found -= {"skillframe.robot.spec.RobotFile"}
     assert not found - set(re.findall(r"autoclass:: ([\w.]+)", PAGE))
 
 

@@ -32,6 +32,14 @@ def assert_same(a, b, tolerance=1e-13):
     np.testing.assert_allclose(a.rotation, b.rotation, atol=tolerance)
 
 
+def test_continuous_quaternions_keep_their_orientation_and_never_jump():
+    turns = frames.rotation_matrix(np.linspace(0, 9, 50)[:, None] * np.array([0.3, 0.5, 0.8]))
+    quaternion = frames.quaternion_from_matrix(turns)
+    smooth = frames.continuous(quaternion)
+    assert np.allclose(frames.matrix_from_quaternion(smooth), turns)
+    assert (smooth[1:] * smooth[:-1]).sum(-1).min() > 0.0 > (quaternion[1:] * quaternion[:-1]).sum(-1).min()
+
+
 def test_composition_of_poses_is_associative():
     a, b, c = (pick(POSES, slice(i, i + 20)) for i in (0, 20, 40))
     assert_same(a.compose(b).compose(c), a.compose(b.compose(c)))

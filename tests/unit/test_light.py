@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from skillframe.extend.homes import HOMES
-from skillframe.extend.records import Lazy
+from skillframe.extend.homes import homes
+from skillframe.extend.records import ExporterType, Lazy
 from skillframe.extend.registry import KINDS, registry
 
 PLUGINS = sorted(p for p in (Path(__file__).resolve().parents[2] / "plugins").iterdir() if (p / "src").is_dir())
@@ -46,6 +46,7 @@ def test_help_names_the_commands_of_plugins_and_loads_no_parser_of_metadata():
     assert not loaded & {"email", "csv", "zipfile", "tomllib", "json", "dataclasses", "pluggy", "difflib"}
 
 
+@pytest.mark.slow
 def test_an_entry_module_of_a_plugin_loads_nothing_heavy():
     for plugin in PLUGINS:
         package = next((plugin / "src").iterdir()).name.removesuffix(".py")
@@ -67,12 +68,14 @@ def test_no_hook_of_the_core_loads_a_heavy_library():
 
 @pytest.mark.needs_plugins
 @pytest.mark.parametrize("plugin", HOOKED, ids=lambda p: p.name)
+@pytest.mark.slow
 def test_no_hook_of_a_plugin_loads_a_heavy_library(plugin):
     assert not loaded_by(CALL_EVERY_HOOK.format(count=2, least=14), plugin.name) & HEAVY
 
 
 @pytest.mark.needs_plugins
-@pytest.mark.parametrize("words", ["plugins list", "plugins list --json", "reproduce --list --json"])
+@pytest.mark.parametrize("words", ["plugins", "plugins --json", "reproduce --list --json"])
+@pytest.mark.slow
 def test_a_listing_loads_no_heavy_library(words):
     code = f"from skillframe.cli.main import run; assert run({words.split()!r}) == 0"
     assert not loaded_by(code, ALL_PLUGINS) & HEAVY
@@ -90,12 +93,14 @@ ask([], cli)
 
 
 @pytest.mark.needs_plugins
+@pytest.mark.slow
 def test_the_help_of_no_command_loads_a_heavy_library():
     assert not loaded_by(HELP_OF_EVERY_COMMAND, ALL_PLUGINS) & HEAVY
 
 
 @pytest.mark.needs_plugins
 @pytest.mark.parametrize("typed", ["skillframe pl", "skillframe plugins s", "skillframe run --wo"])
+@pytest.mark.slow
 def test_completing_a_word_loads_no_heavy_library(typed):
     code = (
         "from skillframe.cli.main import cli\n"
@@ -109,7 +114,15 @@ def test_completing_a_word_loads_no_heavy_library(typed):
 ARGUMENTS = {
     "build": 1, "check": 1, "learn": 2, "describe": 1, "advice": 1, "explain": 1, "area": 1, "example": 0, "centers": 1,
     "fit": 3, "run": 1, "write": 2, "compute": 1, "speed": 1, "exception": 1,
+    "make": 3, "SectionType.make": 1, "adapted": 2, "audit": 1, "derived": 1, "told": 1, "quantities": 0, "tables": 0,
+    "write_out": 2, "lacks": 2, "noise": 1, "teach": 3, "teacher": 0, "aimed": 3, "plots": 1,
+    "world": 1, "files": 1, "refuse": 1,
+    "read": 2, "table": 2, "claims": 1, "write_set": 2, "check_set": 1, "warnings": 1,
+    "OutputType.write": 3, "draw": 1, "find": 0, "fix": 0,
+    "holds": 1, "live": 1, "FolderType.read": 1, "page": 1,
+    "found": 2, "usual": 1, "record": 3, "open": 1, "fake": 2,
 }  # fmt: skip
+NAMED = {"teach": {"count": 1, "seed": 0}, "record": {"count": 1, "seed": 0}}
 
 
 def factories():
@@ -127,10 +140,12 @@ def factories():
 @pytest.mark.needs_plugins
 def test_every_factory_that_is_imported_when_called_is_there_and_takes_what_it_is_given():
     found = list(factories())
-    assert {name for _, name, *_ in found} == set(ARGUMENTS)
+    assert {name for _, name, *_ in found} == {name.rpartition(".")[2] for name in ARGUMENTS}
     for record, name, function, (first, named) in found:
+        count = ARGUMENTS.get(f"{type(record).__name__}.{name}", ARGUMENTS.get(name))
+        count += isinstance(record, ExporterType) and record.axes is None  # a program also gets the robot
         try:
-            inspect.signature(function).bind(*first, *range(ARGUMENTS[name]), **named)
+            inspect.signature(function).bind(*first, *range(count), **named, **NAMED.get(name, {}))
         except TypeError as error:
             pytest.fail(f"{name} of {record.name}: {error}")
 
@@ -143,5 +158,5 @@ def test_the_settings_of_every_record_are_a_dataclass():
 @pytest.mark.needs_plugins
 def test_a_row_is_computed_by_the_function_that_says_its_number():
     rows = [(record.name, function) for record, name, function, _ in factories() if name == "run"]
-    assert len(rows) == sum(name.startswith("row:") for name in HOMES)
+    assert len(rows) == sum(name.startswith("row:") for name in homes())
     assert all(run.__doc__.startswith(f"Row {number}: ") for number, run in rows)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from skillframe.campaign import lock
+from skillframe.campaign import folder
 from skillframe.errors import InputError
 from skillframe.fmu import child
 
@@ -49,11 +49,11 @@ import os
 from pathlib import Path
 os.environ["CC"] = "/nonexistent"  # building starts a process, as below; so this is a machine without a compiler
 from skillframe.cli.main import run
-from skillframe.reports import opengl
+from skillframe_reports import opengl
 opengl.backend = lambda: None  # it starts a process, for which Python itself needs on Linux what is hidden here
 assert run(["doctor", "--json"]) == 0
 where = ["--world", "valley", "--robot", "free_tool"]
-assert run(["demonstration", "record", *where, "--count", "2", "--seed", "1", "--out", "demo.npz"]) == 0
+assert run(["record", *where, "--count", "2", "--seed", "1", "--out", "demo.npz"]) == 0
 assert run(["learn", "demo1.npz", "demo2.npz", "--out", "slide.skill.json"]) == 0
 assert run(["run", "slide.skill.json", *where, "--out", "run.npz"]) == 0
 Path("plan.toml").write_text(
@@ -62,7 +62,7 @@ Path("plan.toml").write_text(
 )
 assert run(["campaign", "run", "plan.toml", "--out", "results", "-q"]) == 0
 assert not Path("results/lock").exists() and len(Path("results/results.csv").read_text().splitlines()) == 5
-assert run(["fmu", "check", "any.fmu"]) == 2
+assert run(["fmu", "any.fmu"]) == 2
 """
 
 
@@ -79,26 +79,26 @@ def test_every_module_is_imported_and_lmc_learns_and_runs_where_linux_s_own_call
 
 @pytest.fixture
 def by_name(monkeypatch):
-    monkeypatch.setattr(lock, "ADVISORY", False)
+    monkeypatch.setattr(folder, "ADVISORY", False)
 
 
 def test_without_advisory_locks_the_file_itself_is_the_lock(tmp_path, by_name):
-    with lock.FolderLock(tmp_path):
-        pid, host = lock.holder(tmp_path)
+    with folder.FolderLock(tmp_path):
+        pid, host = folder.holder(tmp_path)
         with pytest.raises(
             InputError, match=rf"process {pid} on {host} may be writing .* has ended there, then delete"
         ):
-            lock.FolderLock(tmp_path).__enter__()
+            folder.FolderLock(tmp_path).__enter__()
         assert (tmp_path / "lock").is_file()  # the one that was refused removes nothing
-    assert lock.holder(tmp_path) is None
+    assert folder.holder(tmp_path) is None
 
 
 def test_without_advisory_locks_that_of_a_killed_writer_is_named_and_deleted_by_hand(tmp_path, by_name):
     (tmp_path / "lock").write_text('{"pid": 12, "host": "there"}')
     with pytest.raises(InputError, match="process 12 on there may be writing"):
-        lock.FolderLock(tmp_path).__enter__()
+        folder.FolderLock(tmp_path).__enter__()
     (tmp_path / "lock").unlink()
-    with lock.FolderLock(tmp_path):
+    with folder.FolderLock(tmp_path):
         pass
 
 

@@ -18,12 +18,22 @@ PAGES += [ROOT / "README.md", *ROOT.glob("plugins/*/README.md")]
 INSIDE = {
     "skillframe_papers",
     "skillframe_benchmarks",
+    "skillframe_certify",
+    "skillframe_drive",
     "skillframe_gym",
+    "skillframe_hydraulics",
+    "skillframe_parts",
+    "skillframe_recordings",
+    "skillframe_reports",
+    "skillframe_teaching",
+    "skillframe_testkit",
+    "skillframe_ur",
+    "skillframe_worlds",
 }  # they run the core from inside, as the page says
 SOURCES = [
     *(p for p in ROOT.glob("plugins/*/src/**/*.py") if not INSIDE & set(p.parts)),
     *ROOT.glob("examples/*.py"),
-    *ROOT.glob("skillframe/cli/plugin_template/**/*.py"),
+    *ROOT.glob("plugins/testkit/src/skillframe_testkit/plugin_template/**/*.py"),
 ]
 
 

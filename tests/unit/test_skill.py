@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
+from skillframe_testkit.suites import HoldSkill, ScriptedSkill, play, random_observations
 
 from skillframe.frames import Pose
 from skillframe.skill import Command, Impedance, Skill, Status, no_reasons, per_trial, row, stack_commands
-from skillframe.testing import HoldSkill, ScriptedSkill, play, random_observations
 
 OBSERVATIONS = random_observations(np.random.default_rng(5), 6, 20, 0.05)
 

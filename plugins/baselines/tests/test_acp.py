@@ -5,16 +5,16 @@ import copy
 import numpy as np
 import pytest
 from skillframe_baselines.acp import Estimator
+from skillframe_testkit.suites import SkillConformance, play
 
 from plugins.baselines.tests.demonstrations import GOAL, approach, both_sides
 from skillframe.demonstration.record import Demonstration
-from skillframe.document.source import learned
+from skillframe.document.file import learned
 from skillframe.errors import InputError
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import Pose, norm
 from skillframe.skill import Observation, Status
-from skillframe.testing import SkillConformance, play
 
 
 @pytest.mark.slow  # simulated runs of seconds, as for every kind of skill

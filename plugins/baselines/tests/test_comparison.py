@@ -29,7 +29,7 @@ def outcomes(tmp_path_factory):
             for written in CAMPAIGNS.glob("*.skill.json"):
                 shutil.copy(written, folder)
             made = f"--world {world} --robot free_tool --count 2 --seed {seed}".split()
-            assert run(["demonstration", "record", *made, "--out", f"{folder}/{world}.npz"]) == 0
+            assert run(["record", *made, "--out", f"{folder}/{world}.npz"]) == 0
             text = (CAMPAIGNS / f"{world}.toml").read_text().replace("seed = 2026", f"seed = {2026 + seed}")
             kept = [line for line in text.splitlines() if not line.startswith('"fixture.')]
             still = "\n".join(kept).replace("trials = 20", f"trials = {IN_PLACE}")

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from skillframe_baselines.document import RATE, SETTLE, resampled
+from skillframe_baselines.common import RATE, SETTLE, resampled
+from skillframe_testkit.suites import SkillConformance, example_demonstrations, play, random_observations
 
 from skillframe.demonstration.record import Demonstration
-from skillframe.document.source import learned
+from skillframe.document.file import learned
 from skillframe.errors import InputError
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
@@ -19,7 +20,6 @@ from skillframe.frames import (
     rotation_vector,
 )
 from skillframe.skill import Observation, Status
-from skillframe.testing import SkillConformance, example_demonstrations, play, random_observations
 
 DT = 0.005
 DURATION = 2.0

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from skillframe_benchmarks.boxes import write
+from skillframe_parts.load import load
+from skillframe_parts.solid import arrays_of
 
 from skillframe.cli.main import run
 from skillframe.errors import InputError
-from skillframe.parts.load import load
-from skillframe.parts.solid import arrays_of
 
 SHAPE = "<collision name='c'><pose>{pose}</pose><geometry>{shape}</geometry></collision>"
 MODEL = """\
@@ -78,6 +78,7 @@ def test_a_plug_that_is_published_above_the_ports_bottom_is_lowered_to_it(tmp_pa
     assert write(tmp_path, "sc", tmp_path / "out").height == pytest.approx(-1.5e-4, abs=1.1e-5)  # one step
 
 
+@pytest.mark.slow
 def test_plates_that_are_too_thin_for_contact_grow_inwards(tmp_path):
     """A bar of 8 mm of four plates of 0.1 mm, closed at both ends: its outside stays, its plates are 0.202 mm."""
     published(tmp_path)

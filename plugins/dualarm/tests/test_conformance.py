@@ -1,4 +1,4 @@
-from skillframe.testing import CoordinatorConformance
+from skillframe_testkit.suites import CoordinatorConformance
 
 
 class TestDualArm(CoordinatorConformance):

@@ -3,14 +3,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from skillframe_dualarm.describe import describe
-from skillframe_dualarm.document import CONFIGURATIONS, Arm, Phase, body, configured, read_phase, relative
+from skillframe_dualarm.document import CONFIGURATIONS, Arm, Phase, body, configured, describe, read_phase, relative
 from skillframe_dualarm.dual_peg import DualPegParams, build
+from skillframe_testkit.suites import WorldConformance
 
 from skillframe.errors import InputError, UnknownName
 from skillframe.extend.registry import registry
 from skillframe.frames import Pose
-from skillframe.testing import WorldConformance
 from skillframe.world.scene import State
 
 TIP = (0.0, 0.0, 0.15)
@@ -54,7 +53,7 @@ WRONG = {
     "should be positive": {"speed": 0.0},
     "add up to 1": {"arms": (ARMS[0], replace(ARMS[1], share=0.5))},
     "'rotatoin'": {"arms": (replace(ARMS[0], compliant=("rotatoin",)), ARMS[1])},
-    "gives way alike": {"mode": "relative", "arms": (replace(ARMS[0], compliant=("rotation",)), ARMS[1])},
+    "are compliant alike": {"mode": "relative", "arms": (replace(ARMS[0], compliant=("rotation",)), ARMS[1])},
     "mode": {"mode": "both"},
 }
 
@@ -77,7 +76,7 @@ def test_two_phases_or_three_arms_are_refused():
 def test_a_document_is_told_in_words():
     lines = describe(body(configured(PHASE, "D", FRAMES)))
     assert lines[0] == "two arms approach along z at 20 mm/s, each arm for itself"
-    assert lines[1].startswith("the arm with the tool makes 100 % of the motion and gives way about y")
+    assert lines[1].startswith("the arm with the tool makes 100 % of the motion and is compliant about y")
     assert "as a relative task" in describe(body(relative(configured(PHASE, "E", FRAMES))))[0]
 
 

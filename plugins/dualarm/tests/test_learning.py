@@ -7,6 +7,8 @@ import pytest
 from skillframe_dualarm.document import read_phase
 from skillframe_dualarm.dual_peg import DualPegParams, build
 from skillframe_dualarm.learner import learn
+from skillframe_teaching.sessions import record
+from skillframe_teaching.teacher import TeacherSettings
 
 from skillframe.document.file import load, new_document, save
 from skillframe.errors import InputError, UnknownName
@@ -14,8 +16,6 @@ from skillframe.execution.executor import simulate
 from skillframe.execution.prepare import load_robot_model, prepare
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
-from skillframe.teaching.sessions import record
-from skillframe.teaching.teacher import TeacherSettings
 
 pytestmark = pytest.mark.needs_plugins
 SCENE = build(DualPegParams())
@@ -26,8 +26,12 @@ def robot():
     return load_robot_model("dual_panda")
 
 
-@cache
 def demonstrations(seed=0):
+    return recorded(seed)
+
+
+@cache
+def recorded(seed):
     local = TeacherSettings(kind="teleoperation", delay_s=0.02)  # master beside slave; 0.1 s is too late to teach this
     return record(robot(), SCENE, local, count=2, seed=seed)
 
@@ -63,15 +67,31 @@ def test_settings_that_nobody_knows_are_refused():
         learn(demonstrations().demonstrations, LearnOptions(settings={"modus": "relative"}))
 
 
-def test_what_was_learned_is_saved_read_and_inserts_from_both_sides(tmp_path):
+@pytest.fixture
+def document(tmp_path):
     kind = registry().coordinator("dual_arm")
     body = learn(demonstrations().demonstrations, LearnOptions(settings={"configuration": "D"}))
     save(new_document(kind, body, demonstrations().demonstrations), tmp_path / "pair.skill.json")
-    document = load(tmp_path / "pair.skill.json")
-    assert document["created_by"]["plugin"] == "skillframe-dualarm"
+    return load(tmp_path / "pair.skill.json")
+
+
+def tried(document, seconds):
     skill, setup = prepare(robot(), SCENE, document)
     draws = {"start.tilt_y": np.radians([6.0, -6.0])}
-    result = simulate(skill, setup, draws, [np.random.default_rng(i) for i in range(2)], duration_s=12.0)
+    return simulate(skill, setup, draws, [np.random.default_rng(i) for i in range(2)], duration_s=seconds)
+
+
+@pytest.mark.slow
+def test_what_was_learned_is_saved_read_and_runs(document):
+    assert document["created_by"]["plugin"] == "skillframe-dualarm"
+    result = tried(document, 0.5)
+    assert all(reason.startswith("time limit") for reason in result.reason), result.reason
+
+
+@pytest.mark.slow
+@pytest.mark.figures
+def test_what_was_learned_inserts_from_both_sides(document):
+    result = tried(document, 12.0)
     assert result.success.all(), result.failure
 
 

@@ -9,8 +9,8 @@ import skillframe_gym
 from gymnasium.utils.env_checker import check_env
 from skillframe_gym.environments import WorldEnv, WorldVectorEnv
 
-from skillframe.api.tasks import robot_of, scene_of
-from skillframe.errors import SkillframeError
+from skillframe.api.inputs import robot_of, scene_of
+from skillframe.errors import InputError, SkillframeError
 from skillframe.execution.executor import Setup, simulate
 from skillframe.frames import Pose, rotation_matrix
 from skillframe.skill import Command, Impedance, Skill, no_reasons
@@ -38,12 +38,14 @@ def rollout(env, steps, seed, actions):
     return seen, rest
 
 
+@pytest.mark.slow
 def test_the_peg_passes_the_checker():
     check(PEG, robot="free_tool", rate_hz=100.0)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted({*skillframe_gym.names()} - MACHINES - {PEG}))
+@pytest.mark.figures
 def test_every_world_passes_the_checker(name):
     check(name, rate_hz=100.0)
 
@@ -54,6 +56,7 @@ def test_a_machine_in_its_world_passes_the_checker(name):
     check(name, rate_hz=100.0)
 
 
+@pytest.mark.slow
 def test_a_vector_environment_is_as_many_single_ones_to_the_last_bit_also_after_some_began_again():
     count, steps = 3, 14  # 10 actions an episode; the first to end is ended by the force that its push meets
     rng = np.random.default_rng(5)
@@ -86,6 +89,7 @@ def test_a_vector_environment_is_as_many_single_ones_to_the_last_bit_also_after_
         WorldEnv("free", "free_tool").step(np.zeros(6, np.float32))
 
 
+@pytest.mark.slow
 def test_a_picture_is_drawn_where_it_is_asked_for_and_shows_the_tool_where_it_is():
     env = WorldEnv("peg_in_hole", **CHEAP, render_mode="rgb_array")
     with pytest.raises(SkillframeError, match="reset"):
@@ -155,3 +159,12 @@ def test_an_episode_has_the_verdict_of_run(push, world, ended):
     assert (info["final_error_m"], info["final_error_rad"]) == (result.final_error_m[0], result.final_error_rad[0])
     assert (terminated, truncated) == (ended != "time", ended == "time")
     assert reward == pytest.approx({"force": -10.0, "time": 0.0, "goal": 10.0}[ended], abs=1.0)  # and the last way
+
+
+def test_an_episode_that_begins_inside_the_fixture_is_refused_and_not_drawn_again():
+    inside = {"fixture.offset_x": 0.02, "fixture.offset_z": 0.002}
+    with pytest.raises(InputError, match=r"is no trial: the tool is [\d.]+ mm inside the fixture"):
+        WorldEnv("peg_in_hole", **CHEAP, set=inside).reset(seed=1)
+    with pytest.raises(InputError, match=r"is no trial: the tool is [\d.]+ mm inside the fixture"):
+        WorldVectorEnv(2, "peg_in_hole", **CHEAP, set=inside).reset(seed=1)
+    WorldEnv("peg_in_hole", **CHEAP, set={**inside, "fixture.offset_z": 0.00105}).reset(seed=1)

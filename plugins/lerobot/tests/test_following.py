@@ -114,6 +114,7 @@ def test_what_cannot_be_used_is_refused_in_a_sentence():
 
 
 @pytest.mark.parametrize("variable", [False, True])
+@pytest.mark.slow
 def test_a_push_by_hand_inserts_the_peg_through_the_environment(variable):
     env = WorldEnv("peg_in_hole", "free_tool", variable_stiffness=variable, starts="nominal", duration_s=8.0)
     policy = following(variable_stiffness=variable)

@@ -146,7 +146,8 @@ def _alignment(tilt: float, recipe: Recipe) -> Demonstration:
     wrist = tip - rotation @ np.array([0.0, 0.0, 0.2])
     force = np.tile([0.0, 0.0, 6.0], (n, 1))
     torque = np.tile([0.0, np.sign(tilt) * 0.6, 0.0], (n, 1))  # resists the turn to upright
-    return recording(wrist, rotation, np.concatenate([force, torque], axis=1), recipe)
+    named = replace(recipe, meta=(("frames", {"tip": [0.0, 0.0, 0.2]}), *recipe.meta))
+    return recording(wrist, rotation, np.concatenate([force, torque], axis=1), named)
 
 
 def rotated(demonstration: Demonstration, turn: Float) -> Demonstration:

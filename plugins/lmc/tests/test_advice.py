@@ -4,11 +4,12 @@ import copy
 
 import numpy as np
 import pytest
-from skillframe_lmc.advice import CUT, GOOD, OTHER_SIDE, advice
+from skillframe_lmc.advice import CUT, GOOD, LIMP, NO_PUSH, OTHER_SIDE, STILL, advice
+from skillframe_lmc.evidence import NOT_ONE_MOTION
 from skillframe_lmc.learner import learn
+from skillframe_testkit.checks.examples import example_demonstrations
 
-from skillframe.conformance.examples import example_demonstrations
-from skillframe.document.source import learned
+from skillframe.document.file import learned
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
 
@@ -17,7 +18,7 @@ pytestmark = pytest.mark.needs_plugins
 
 @pytest.fixture(scope="module")
 def known():
-    """A phase whose push is known, from two demonstrations, and which only holds its attitude."""
+    """A phase whose push is known, from two demonstrations, and which only holds its orientation."""
     return learned(registry().skill("lmc"), list(example_demonstrations()), LearnOptions())
 
 
@@ -44,19 +45,20 @@ def test_an_open_or_a_doubtful_direction_and_one_demonstration_ask_for_the_other
     assert sure.endswith("from 1 demonstration") and then == f"{OTHER_SIDE}; one contradicts nothing"
 
 
-def test_without_a_direction_several_phases_are_cut_and_what_only_gives_way_is_good(known):
+def test_without_a_direction_nothing_is_good_to_try(known):
     limp = with_push(known, message="no one push explains what was seen")
     limp["phases"][0]["translation"] |= {"desired_direction": None, "fully_compliant": True, "compliant_axes": []}
     assert advice(limp) == (
-        "no direction was found: what is free and what is held is all that was learned; from 2 demonstrations",
-        GOOD,
-    )
-    several = with_push(
-        limp, message="not even one demonstration alone is a single linear motion, so cut it into phases"
-    )
+        "no direction was found: what is free and what is held is all that was learned; from 2 demonstrations", LIMP,
+    )  # fmt: skip
+    partly = copy.deepcopy(limp)
+    partly["phases"][0]["translation"] |= {"fully_compliant": False, "compliant_axes": [[1.0, 0.0, 0.0]]}
+    assert advice(partly)[1] == NO_PUSH
+    several = with_push(limp, message=f"no one push explains what was seen; {NOT_ONE_MOTION}")
     assert advice(several)[1] == CUT
+    assert advice(with_push(limp, held=True))[1] == STILL
 
 
 def test_a_phase_that_the_learner_gives_has_advice(known):
     document = {"learned_from": [{}], **learn(list(example_demonstrations()[:1]), LearnOptions())}
-    assert advice(document)[1] == OTHER_SIDE  # one slope leaves the direction open
+    assert advice(document)[1].startswith(f"{OTHER_SIDE}, going towards")  # one slope leaves the direction open

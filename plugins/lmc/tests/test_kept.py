@@ -27,13 +27,16 @@ DAMAGE: dict[str, tuple[tuple[str | int, ...], Any]] = {
     "translation.evidence.work_teacher_j: expected a number": (("work_teacher_j",), [1.0]),
     "translation.evidence.work_teacher_j: is too large": (("work_teacher_j",), 10**400),
     "translation.evidence.pyramid_angle_rad: expected a number": (("pyramid_angle_rad",), "wide"),
-    "translation.evidence: holds pyramid_angle_rad without": (("feasible_solid_angle_sr",), None),
+    "translation.evidence: holds explained without": (("feasible_solid_angle_sr",), None),
     "translation.evidence.criterion: expected a list": (("criterion",), 1.0),
     "translation.evidence: lacks the key 'criterion'": (("criterion",), DELETE),
     "demonstrations.1.: lacks the key 'push'": (("demonstrations", 1, "push"), DELETE),
     "demonstrations.1..push.0.: expected 3 values": (("demonstrations", 1, "push", 0), [1.0]),
     "demonstrations.1..motion.0..2.: expected a number": (("demonstrations", 1, "motion", 0, 2), None),
-    "demonstrations.1.: holds motion, push and contact of different": (("demonstrations", 1, "contact"), []),
+    "demonstrations.1.: holds motion, push, edge, contact": (
+        ("demonstrations", 1, "contact"),
+        [],
+    ),
 }
 
 

@@ -9,10 +9,9 @@ import synthetic as syn
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from skillframe_lmc.learner import learn
-from skillframe_lmc.settings import Settings
+from test_posterior import legs
 
 from skillframe.demonstration.record import Demonstration
-from skillframe.errors import InputError, UnknownName
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, rotation_matrix
 
@@ -55,11 +54,12 @@ def test_both_sides_of_a_valley_give_straight_down_and_one_axis_across(slope: fl
     assert abs(axis[0]) > math.cos(math.radians(GRID))
     assert not part["fully_compliant"]
     assert not part["evidence"]["ambiguous"]
-    assert part["evidence"]["votes"] == 1.0
+    assert part["evidence"]["explained"] == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize("sigma", [3.0, 8.0, 15.0])
 @pytest.mark.parametrize("slope", [45.0, 30.0])
+@pytest.mark.slow
 def test_a_wavering_hand_still_gives_a_feasible_direction_and_one_axis(slope: float, sigma: float) -> None:
     feasible = slope - math.degrees(math.atan(0.2))
     found = [translation(syn.wavering(slope, 0.2, sigma, seed)) for seed in range(12)]
@@ -85,14 +85,6 @@ def test_two_demonstrations_from_the_same_side_are_as_ambiguous_as_one() -> None
     assert translation([syn.slide(30, 0.2), syn.slide(30, 0.2, syn.Recipe(seed=1))])["evidence"]["ambiguous"]
 
 
-def test_the_solid_angle_is_that_of_the_pyramid() -> None:
-    seen = translation([syn.slide(45, 0.2)])["evidence"]
-    alpha = 1.25 * math.radians(8.0)  # the set is taken at the slack times the least half-opening
-    width = math.pi / 2 - math.atan(0.2) + 2.0 * math.radians(5.0)
-    # cells along the strip's rim: about 2 (width + 2 alpha) / (1.6 degrees) of them, half in doubt
-    assert seen["feasible_solid_angle_sr"] == pytest.approx(2.0 * math.sin(alpha) * width, rel=0.06)
-
-
 @pytest.mark.parametrize("apart", [75, 90, 120, 180])
 def test_contradictory_free_motions_have_no_direction(apart: float) -> None:
     a = math.radians(apart / 2.0)
@@ -101,9 +93,7 @@ def test_contradictory_free_motions_have_no_direction(apart: float) -> None:
     assert part["desired_direction"] is None
     assert part["speed"] == 0.0
     assert part["evidence"]["feasible_solid_angle_sr"] == 0.0
-    # halfway between them each is apart / 2 away, and a cone of alpha + alpha / 3 must reach it
-    assert part["evidence"]["pyramid_angle_rad"] == pytest.approx(0.75 * a, abs=math.radians(1.0))
-    assert part["evidence"]["pyramid_angle_rad"] > Settings().pyramid_max_rad
+    assert part["evidence"]["explained"] < 0.51  # at most one of the two
 
 
 def test_a_free_motion_is_its_own_direction_and_needs_no_compliance() -> None:
@@ -187,8 +177,8 @@ def test_intervals_that_the_environment_turned_never_vote() -> None:
     pushed = slice(int(0.7 * n), n)
     wrench[pushed, 3:] = [0.4, 0.0, 0.2]  # the environment turns the last 30 %, mostly across the axis
     both = translationless(replace(ahead, wrench=wrench))
-    assert degrees_between(both["desired_direction"], [0.0, 0.0, 1.0]) <= GRID
-    assert both["evidence"]["votes"] == 1.0
+    assert degrees_between(both["desired_direction"], [0.0, 0.0, 1.0]) <= 3.0  # a piece is half of either
+    assert both["evidence"]["explained"] == pytest.approx(1.0)
 
 
 def translationless(demonstration: Demonstration) -> Document:
@@ -335,7 +325,7 @@ def test_the_recorded_point_does_not_matter_once_it_is_learned_at_the_same_one()
         other.append(
             replace(d, position=d.position + shift, wrench=wrench, meta={"frames": {"wrist": (-arm).tolist()}})
         )
-    assert_same_geometry(phase(demos), phase(other, at="wrist"), tolerance=1.0)
+    assert_same_geometry(phase(demos, at="0,0,0"), phase(other, at="wrist"), tolerance=1.0)
 
 
 def test_the_recordings_own_hand_is_used_unless_another_is_named() -> None:
@@ -360,38 +350,33 @@ def test_compliant_axes_are_square_to_the_direction_and_free_in_the_stiffness() 
     assert np.linalg.eigvalsh(np.array(part["damping"])).min() >= 20.0 - 1e-9
 
 
+def test_across_the_push_a_tool_that_did_not_turn_is_soft_where_no_contact_asked_for_compliance() -> None:
+    """2 N of bias move it 20 mm along y, in the valley's length; a motion error of 5 mm makes 0.5 N of side force."""
+    for share in (0.1, 1.0):
+        K = np.array(translation(syn.valley(45, 0.2), settings={"side_stiffness": share})["stiffness"])
+        np.testing.assert_allclose(np.diag(K), [0.0, 1000.0 * share, 1000.0], atol=2.0)
+    turned = np.array(translation(syn.pair_of_alignments())["stiffness"])
+    np.testing.assert_allclose(np.diag(turned), [0.0, 1000.0, 1000.0], atol=2.0)
+
+
+def test_the_axis_of_a_tool_that_turned_is_square_to_its_turn_and_to_the_push() -> None:
+    """The first pushes the swinging learning point aside along y, too: its own mean direction is 22 degrees off x."""
+    shown = syn.pair_of_alignments()
+    aside = [replace(d, position=d.position + s * np.outer(np.linspace(0, 0.012, len(d)), [0.0, 1.0, 0.0]))
+             for s, d in zip((1.0, -1.0), shown, strict=True)]  # fmt: skip
+    part = translation(aside)
+    assert abs(part["compliant_axes"][0][1]) < 0.02
+
+
+def test_humps_are_neither_open_nor_doubtful_although_all_go_one_way() -> None:
+    seen = translation([legs((0.0, floor), (52.0, 0.016)) for floor in (0.03, 0.05, 0.07)])["evidence"]
+    assert not seen["ambiguous"] and seen["message"] == ""
+    assert math.degrees(seen["feasible_half_width_rad"]) > 20.0  # or the test would show nothing
+
+
 def test_a_recording_without_motion_is_held_and_says_so() -> None:
     still = syn.straight([0, 0, -1], 0.0004, [0, 0, 40.0], syn.Recipe(speed=1e-4, noise_m=5e-5, noise_n=0.3))
     found = phase([still])
     for name in ("translation", "rotation"):
         assert found[name]["evidence"]["held"]
         assert "count as a motion" in found[name]["evidence"]["message"]
-
-
-def test_demonstrations_of_different_tools_are_refused() -> None:
-    a, b = syn.valley(45, 0.2)
-    a, b = replace(a, meta={"frames": {"tip": [0, 0, 0.1]}}), replace(b, meta={"frames": {"tip": [0, 0, 0.2]}})
-    with pytest.raises(InputError, match="learn from demonstrations of one tool"):
-        learn([a, b], LearnOptions())
-
-
-def test_bad_requests_are_refused_in_words() -> None:
-    demos = syn.valley(45, 0.2)
-    with pytest.raises(InputError, match="no demonstration"):
-        learn([], LearnOptions())
-    with pytest.raises(InputError, match="unknown key 'stp_m'"):
-        learn(demos, LearnOptions(settings={"stp_m": 0.001}))
-    with pytest.raises(InputError, match="not a positive number"):
-        learn(demos, LearnOptions(settings={"step_m": -1.0}))
-    with pytest.raises(InputError, match="quantile must be at most 1"):
-        learn(demos, LearnOptions(settings={"quantile": 1.5}))
-    with pytest.raises(UnknownName, match="unknown point 'nose'"):
-        learn(demos, LearnOptions(at="nose"))
-    with pytest.raises(InputError, match="neither base nor phase_start"):
-        learn(demos, LearnOptions(axes="bse"))
-    wrench = demos[0].wrench.copy()
-    wrench[5, 2] = np.nan
-    with pytest.raises(InputError, match="not finite"):
-        learn([replace(demos[0], wrench=wrench)], LearnOptions())
-    with pytest.raises(InputError, match="record more"):
-        learn([demos[0].between(0.0, 0.03)], LearnOptions())

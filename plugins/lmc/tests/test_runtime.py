@@ -104,7 +104,7 @@ def test_a_slow_arm_is_told_the_speed_of_the_push_and_nothing_where_there_is_non
     turning["phases"][0]["translation"] = part(None, 0.0, [], 1000.0)
     assert (speed(pushing), speed(turning)) == (0.013, None)
     pushing["type"] = "lmc"
-    _, setup = prepare(load_robot_model("ur5e_position"), load_world("valley", {}), pushing, "tip")
+    _, setup = prepare(load_robot_model("ur5e"), load_world("valley", {}), pushing, "tip")
     assert setup.skill_speed == 0.013
     assert setup.pace == pytest.approx(0.013 / setup.robot.spec.control.admittance.speed)
 
@@ -144,6 +144,7 @@ def test_creeping_is_not_a_stall() -> None:
     assert last.status[0] == Status.RUNNING
 
 
+@pytest.mark.slow
 def test_sliding_sideways_or_turning_is_not_a_stall() -> None:
     slide = (observe(k * DT, np.array([[1e-3 * k * DT, 0.0, 0.0]])) for k in range(3000))
     spin = (

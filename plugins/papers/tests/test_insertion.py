@@ -47,6 +47,7 @@ def test_joint_friction_in_the_slave_makes_c_fail_at_8_degrees():
 
 
 @pytest.mark.slow
+@pytest.mark.figures
 def test_with_joint_friction_c_is_worst_then_d_then_b():
     found = {name: largest(outcomes(name, TILTS, [0.5]), 1, 0.5) for name in "BCD"}
     assert found["C"] <= 6.0 and 6.0 <= found["D"] <= 10.0 and found["B"] >= 12.0
@@ -64,6 +65,7 @@ def test_the_relative_task_lowers_forces_and_paths_on_the_same_starts():
 
 
 @pytest.mark.slow
+@pytest.mark.figures
 def test_the_relative_task_inserts_where_independent_arms_turn_or_jam():
     tilts = [8.0, 10.0, -8.0, -10.0]
     alone, together = (outcomes(name, tilts, [0.25]) for name in ("E", "E*"))
@@ -72,6 +74,7 @@ def test_the_relative_task_inserts_where_independent_arms_turn_or_jam():
 
 
 @pytest.mark.slow
+@pytest.mark.figures
 def test_two_compliant_arms_fail_in_ways_of_their_own():
     found = {row.outcome for row in outcomes("E", [8.0, 10.0, 12.0, -8.0, -10.0, -12.0], [0.5])}
     assert found & {"common rotation", "turned away"}
@@ -108,6 +111,7 @@ def test_table_of_forces_when_the_skill_goes_on_to_the_bottom(posture):
 
 
 @pytest.mark.slow
+@pytest.mark.figures
 def test_a_pair_that_comes_free_hits_the_bottom_harder_than_it_was_pushed():
     cut, whole = (outcomes("B", [8.0], [0.5], to_the_bottom=on) for on in (False, True))
     assert cut[0].outcome == "success" and cut[0].force_n < 40.0  # the lead's 30 N and a third

@@ -1,9 +1,9 @@
 """How an insertion with two arms ended, told from how far each tool turned."""
 
 import numpy as np
-from skillframe_papers.rows.outcome import classify
+from skillframe_papers.rows.insertion import classify
 
-from skillframe.execution.arms import ArmsResult
+from skillframe.execution.result import ArmsResult
 from skillframe.skill import no_reasons
 
 

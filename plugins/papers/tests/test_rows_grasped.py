@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from skillframe_dualarm.dual_peg import REACH
+from skillframe_papers import bars
 from skillframe_papers.published import SEARCHED
 from skillframe_papers.rows import grasped, search
 from skillframe_papers.rows.blocks import Blocks
@@ -75,10 +76,57 @@ def test_learned_forces_must_find_enough_and_more_than_a_constant_push(ours, nul
     assert search.soft(JOB).verdict == expected
 
 
-@pytest.mark.parametrize(("ours", "null", "expected"), [(27, 10, "pass"), (27, 25, "fail"), (10, 0, "fail")])
-def test_ergodic_control_must_find_enough_and_more_than_the_random_walk(ours, null, expected, monkeypatch):
-    monkeypatch.setattr(search, "tried", lambda *_: searched(ours, null))
-    assert search.ergodic(JOB).verdict == expected
+@pytest.mark.parametrize(
+    ("ours", "walk", "spiral", "expected"),
+    [(27, 10, 10, "pass"), (27, 25, 10, "fail"), (27, 10, 27, "fail"), (10, 0, 0, "fail")],
+)
+def test_ergodic_control_must_find_enough_and_more_than_random_walk_and_centred_spiral(
+    ours, walk, spiral, expected, monkeypatch
+):
+    monkeypatch.setattr(search, "tried", lambda *_: searched(ours, walk, spiral))
+    row = search.ergodic(JOB)
+    assert row.verdict == expected
+    assert (search.CENTRED in row.ours) == (spiral == 27)
+
+
+@pytest.mark.parametrize(
+    ("walk", "ours", "spiral", "expected"),
+    [(4, 36, 10, "pass"), (4, 36, 40, "fail"), (4, 36, 30, "fail"), (26, 36, 10, "fail"), (0, 20, 0, "fail")],
+)
+def test_the_learned_search_must_find_more_than_a_centred_spiral(walk, ours, spiral, expected, monkeypatch):
+    def tried(job, asked):
+        hits = {search.WALK: walk, search.SAMPLES: ours, search.SPIRAL: spiral}
+        return [searched(hits.get(each.method, ours), count=40)[0] for each in asked]
+
+    monkeypatch.setattr(search, "tried", tried)
+    monkeypatch.setattr(search, "_figure_16", lambda *_: None)
+    monkeypatch.setattr(search, "_curves", lambda _: None)
+    row = search.found(JOB)
+    assert row.verdict == expected
+    assert (f"no better than {search.CENTRED}" in row.ours) == (spiral >= 30)
+
+
+@pytest.mark.parametrize(
+    ("spiral", "ours", "centred", "expected"),
+    [(17, 25, 40, "fail"), (10, 30, 40, "pass"), (10, 30, 39, "fail"), (20, 20, 40, "fail")],
+)
+def test_a_spiral_off_centre_must_be_behind_by_intervals_and_not_by_points(
+    spiral, ours, centred, expected, monkeypatch
+):
+    def tried(job, asked):
+        hits = {search.SAMPLES: ours, search.SPIRAL: spiral}
+        return [searched(hits[e.method] if e.task == search.OFF else centred, count=40)[0] for e in asked]
+
+    monkeypatch.setattr(search, "tried", tried)
+    assert search.spiral(JOB).verdict == expected
+
+
+def test_two_equal_searches_are_told_apart_in_less_than_one_draw_in_a_hundred():
+    rng = np.random.default_rng(0)
+    one, two = rng.binomial(40, 0.525, (2, 2000))  # the mean of 17 and 25 of 40
+    first = np.mean([bars.ahead(int(a), int(b), 40, quick=False) for a, b in zip(one, two, strict=True)])
+    points = np.mean(one - two >= 0.15 * 40)
+    assert first < 0.01 and points > 0.08  # 15 points ahead, as the row had it
 
 
 def test_what_several_rows_ask_is_searched_once_and_the_first_goals_are_those_of_all(monkeypatch):

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from skillframe_papers.rows import alone, concatenated, coordinates, region, sensorless
+from skillframe_papers.rows import concatenated, coordinates, region, sensorless, skills
 from skillframe_papers.rows.blocks import Trials, successes
-from skillframe_papers.rows.skills import Ran, by_hand, stiff
+from skillframe_papers.rows.harness import Ran, stiff
+from skillframe_papers.rows.skills import by_hand
 
 from skillframe.execution.prepare import load_robot_model, load_world
 from skillframe.extend.records import RowRun
@@ -18,6 +19,7 @@ def ran(hits, count=24):
     return Ran(np.arange(count).reshape(4, -1) < hits)
 
 
+@pytest.mark.slow
 def test_skills_side_by_side_end_as_each_does_alone():
     robot, scene = load_robot_model("free_tool"), load_world("valley", {})
     draws = {"start.offset_x": np.array([0.006, 0.03])}
@@ -63,7 +65,7 @@ def test_the_region_s_row_fails_where_what_knows_nothing_of_the_learned_push_tel
 ):
     tried = [region.Tried(0.05, {}, np.arange(200) < 100)]
     right = {region.OURS: ours, region.STRAIGHT: straight, region.ALL: every, region.NONE: 200 - every}
-    row = region._told(JOB, right, tried)
+    row = region.result(JOB, right, tried)
     assert row.verdict == expected and "100 converge" in row.difference and "2.9 to 2.9" in row.difference
 
 
@@ -73,10 +75,10 @@ def test_the_region_s_row_fails_where_what_knows_nothing_of_the_learned_push_tel
 )
 def test_one_demonstration_must_do_in_both_worlds_and_beside_a_stiff_push(valley, coupler, null, expected):
     found = {
-        world: {alone.LEARNED: ran(hits), alone.NULL: ran(null)}
+        world: {skills.ONE: ran(hits), skills.RIGID: ran(null)}
         for world, hits in (("valley", valley), ("hose coupler", coupler))
     }
-    assert alone._told(JOB, found, "").verdict == expected
+    assert skills.of_one(JOB, found, "").verdict == expected
 
 
 def part(direction, *axes):
@@ -107,7 +109,7 @@ def test_what_is_published_of_each_world_is_asked_of_what_was_learned():
 )
 def test_concatenation_is_judged_beside_one_demonstration_and_beside_ours(literal, null, ours, expected, said):
     hits = {concatenated.LITERAL: literal, concatenated.NULL: null, concatenated.OURS: ours}
-    row = concatenated._told(JOB, dict.fromkeys(concatenated.TASKS, hits), 20)
+    row = concatenated.result(JOB, dict.fromkeys(concatenated.TASKS, hits), 20)
     assert row.verdict == expected and said in row.difference
 
 
@@ -124,12 +126,12 @@ def test_the_tool_s_axes_must_do_where_base_axes_do_not_and_both_in_place(ours, 
             (coordinates.TOOL, False, still), (coordinates.BASE, False, still),
         )
     }  # fmt: skip
-    assert coordinates._told(JOB, found).verdict == expected
+    assert coordinates.result(JOB, found).verdict == expected
 
 
 def test_all_is_turned_by_40_to_80_degrees():
     for seed in range(10):
-        x, y, z, w = coordinates.turned(seed).spec.workspace.attitude
+        x, y, z, w = coordinates.turned(seed).spec.workspace.orientation
         angle = 2.0 * np.degrees(np.arctan2(np.linalg.norm([x, y, z]), abs(w)))
         assert coordinates.LEAST_DEG <= angle <= coordinates.MOST_DEG
 
@@ -141,7 +143,7 @@ def test_all_is_turned_by_40_to_80_degrees():
 def test_a_commanded_wrench_must_do_where_none_and_on_the_hump_the_mean_motion_do_not(ours, none, motion, expected):
     ways = {sensorless.OURS: ran(ours), sensorless.NONE: ran(none), sensorless.SENSED: ran(24)}
     valley, hump = ({**ways, sensorless.MOTION: ran(n)} for n in (24, motion))
-    assert sensorless._told(JOB, dict(zip(sensorless.TASKS, (valley, hump), strict=True))).verdict == expected
+    assert sensorless.result(JOB, dict(zip(sensorless.TASKS, (valley, hump), strict=True))).verdict == expected
 
 
 def test_a_push_put_in_another_s_place_is_stiff_along_itself_and_free_square_to_it():

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from skillframe_papers.rows import exceptions, screws, whole_tasks
-from skillframe_papers.rows.skills import Ran
+from skillframe_papers.rows import exceptions, screws, skills, whole_tasks
+from skillframe_papers.rows.harness import Ran
 
 from skillframe.execution.prepare import load_world
 from skillframe.extend.records import RowRun
@@ -26,15 +26,15 @@ def ran(hits, count=24):
 def test_a_policy_is_worth_something_only_if_one_phase_and_replays_do_less(policy, one, shifted, placed, expected):
     names = ("policy", *whole_tasks.NULLS, whole_tasks.HALVES)
     counts = dict(zip(names, (policy, one, shifted, placed, policy), strict=True))
-    row = whole_tasks._told(RowRun(settings={}), {name: ran(hits) for name, hits in counts.items()})
+    row = whole_tasks.result(RowRun(settings={}), {name: ran(hits) for name, hits in counts.items()})
     assert row.verdict == expected
-    assert row.ours.endswith(f"cut in the middle {policy}") and "are not behind" in row.difference
+    assert f"cut in the middle, {policy} of 24" in row.ours and row.ours.endswith("by 95 % intervals not fewer")
 
 
 def test_whole_tasks_start_as_shown_and_their_fixtures_stand_elsewhere_within_what_is_said():
     task = whole_tasks.TASKS["hose coupler"]
     scene = load_world(task.world, dict(task.params))
-    draws = whole_tasks._draws(task, scene, 6, 1)
+    draws = whole_tasks.draws(task, scene, 6, 1)
     shown = [start["start.tilt_y"] for start in scene.task.starts]
     assert draws["start.tilt_y"].tolist() == [shown[i % len(shown)] for i in range(6)]
     for key, most in task.moved.items():
@@ -73,22 +73,23 @@ def test_a_screw_s_row_fails_if_the_push_or_the_turn_does_it_alone_or_if_it_is_n
     ours, push, turn, told, expected
 ):
     found = {screws.OURS: ran(ours), screws.PUSH: ran(push), screws.TURN: ran(turn), screws.HAND: ran(24)}
-    row = screws._told(RowRun(settings={}), found, told, 0)
+    row = screws.result(RowRun(settings={}), found, Ran.of(told, 4), 0)
     assert row.verdict == expected
-    assert ("by hand" in row.difference) or ours < 24
+    assert "by 95 % intervals not fewer: by hand: push and turn 24 of 24" in row.ours
+    assert "so few sets do not show 90 % of sets" in row.ours
 
 
 @pytest.mark.parametrize(
     ("ours", "alone", "spiral", "expected"),
-    [(24, 0, 12, "pass"), (24, 24, 12, "fail"), (24, 0, 24, "pass"), (20, 0, 0, "reported"), (10, 0, 0, "fail")],
+    [(24, 0, 12, "pass"), (24, 24, 12, "fail"), (24, 0, 24, "fail"), (20, 0, 0, "reported"), (10, 0, 0, "fail")],
 )
-def test_a_search_on_a_stall_is_judged_beside_the_push_alone_and_says_whether_an_untaught_spiral_does_less(
+def test_a_search_on_a_stall_is_judged_beside_the_push_alone_and_beside_an_untaught_spiral(
     ours, alone, spiral, expected
 ):
     found = {exceptions.OURS: ran(ours), exceptions.NULL: ran(alone), exceptions.SPIRAL: ran(spiral)}
-    row = exceptions._told(RowRun(settings={}), found, {exceptions.OURS: [5.0]})
+    row = exceptions.result(RowRun(settings={}), found, {exceptions.OURS: [5.0]})
     assert row.verdict == expected
-    assert ("not behind" in row.difference) == (spiral == 24)
+    assert row.ours.endswith(f"no better than {exceptions.SPIRAL}") == (spiral == 24)
     assert row.rows[0][3] == "5.0 s" and row.rows[1][3] == "-"
 
 
@@ -96,3 +97,21 @@ def test_the_fixture_of_the_search_stands_3_to_5_mm_beside_its_place():
     off = exceptions.draws(50, 1)
     length = np.hypot(off["fixture.offset_x"], off["fixture.offset_y"])
     assert 0.003 <= length.min() < length.max() <= 0.005
+
+
+@pytest.mark.parametrize("quick", [False, True])
+def test_the_push_by_hand_is_run_from_the_same_starts_and_is_among_the_nulls(quick, monkeypatch):
+    asked = {}
+
+    def run(job, world, given, starts, *_):
+        asked[world] = starts
+        return {name: Ran(np.ones((len(each), 5), dtype=bool)) for name, each in given.items()}
+
+    monkeypatch.setattr(skills, "run", run)
+    monkeypatch.setattr(skills, "skills_of", lambda job, world, each=2: [skills.by_hand()] * 6)
+    skills._pegs.cache_clear()
+    for row in (skills.region, skills.peg, skills.single):
+        told = row(RowRun(settings={}, quick=quick))
+        assert told.verdict == "fail" and "no better than " in told.ours and "by hand: straight down" in told.ours
+    skills._pegs.cache_clear()
+    assert list(asked) == ["valley", "peg_in_hole"]

@@ -36,10 +36,10 @@ def demonstrations(world, believed, centre=ZERO):
     return trials.demonstrations(task(world, believed, centre))
 
 
-def document(kind, world, believed, centre=ZERO, **settings):
+def document(world, believed, centre=ZERO, **settings):
     """A search learned at the tip, at 15 mm/s like all its rivals."""
     given = demonstrations(world, believed, centre)
-    return trials.document(kind, task(world), given, **{"speed": SPEED, "push": 10.0, **settings})
+    return trials.document(task(world), given, **{"speed": SPEED, "push": 10.0, **settings})
 
 
 def goals(count, believed, centre=ZERO, seed=100):

@@ -5,6 +5,7 @@ from math import sqrt
 
 import numpy as np
 from skillframe_search import seat, seat_document, seat_learner
+from skillframe_search.handling import HANDLING, Handling
 from skillframe_search.seat_document import Seat
 
 from skillframe.extend.registry import registry
@@ -50,8 +51,8 @@ def known(monkeypatch, **kinds):
         monkeypatch.setattr(module, "registry", Known)
 
 
-SEAT = Seat(way=(0.0, 0.0, -1.0), point=(0.0, 0.0, 0.0), end=(0.4, 0.0, 0.2), attitude=(0.0, 0.0, 0.0),
-            start=(0.4, 0.0, 0.23), contact_m=0.012, above_m=0.014, approach=False)  # fmt: skip
+SEAT = Seat(way=(0.0, 0.0, -1.0), point=(0.0, 0.0, 0.0), end=(0.4, 0.0, 0.2), orientation=(0.0, 0.0, 0.0),
+            start=(0.4, 0.0, 0.23), contact_m=0.012, approach=False, settle_s=0.0)  # fmt: skip
 MOST_TILT = sqrt(2.0) * SEAT.tilt_rad
 """A fixture that is off by the stated tilt about both axes across the way is off by so much [rad]."""
 
@@ -61,7 +62,9 @@ class Played:
 
     def __init__(self, **changes):
         self.push, self.search = Script(), Script()
-        self.skill = seat.Seating(replace(SEAT, **changes), np.zeros(3), lambda: self.push, lambda: self.search)
+        how = {name: changes.pop(name) for name in [*changes] if name in Handling.__dataclass_fields__}
+        placed = replace(SEAT, **changes)
+        self.skill = seat.Seating(placed, np.zeros(3), lambda: self.push, lambda: self.search, replace(HANDLING, **how))
         self.time, self.deep, self.aside, self.turn, self.speed = (
             0.0,
             np.full(3, -0.012),

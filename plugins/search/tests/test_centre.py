@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 from skillframe_search.centre import ACROSS, Centre
+from skillframe_search.handling import HANDLING
 from skillframe_search.seat import CENTRING
 
-from plugins.search.tests.test_seat import DOWN, SEAT, Played
+from plugins.search.tests.test_seat import DOWN, Played
 from skillframe.frames import Pose
 from skillframe.skill import Observation, Status
 
@@ -88,7 +89,7 @@ def rests(aside, **changes):
     played = Played(**changes)
     played.go()
     played.deep[:], played.aside[:] = 0.0, aside
-    return played, played.go(SEAT.stall_s + 0.05)
+    return played, played.go(HANDLING.stall_s + 0.05)
 
 
 def test_at_the_end_and_aside_it_is_drawn_back_once_and_then_done():
@@ -111,6 +112,6 @@ def test_what_nothing_stops_is_not_pressed_while_it_is_drawn_back():
 
 def test_farther_aside_than_the_fixture_may_be_off_is_no_seat():
     played, _ = rests(0.02)
-    played.go(SEAT.stall_s + 2.0)
+    played.go(HANDLING.stall_s + 2.0)
     names = [text.split(":")[0] for _, text in played.skill.journal(0)]
     assert names[:4] == ["push", "centre", "push", "approach"]

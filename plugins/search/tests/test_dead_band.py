@@ -10,7 +10,7 @@ from skillframe_search.plan import dithered
 from skillframe_search.simple import FINER, there_and_back
 from test_search_in_contact import given, run
 
-from skillframe.document.source import learned
+from skillframe.document.file import learned
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
 
@@ -88,17 +88,19 @@ def test_friction_is_read_from_the_wrench_while_sliding_whatever_the_push():
     assert friction_of(Samples(0.0 * rate, 0.0 * rate, wrench), DOWN) is None  # it never slid
 
 
+@pytest.mark.slow
 def test_a_spiral_is_freed_of_the_friction_that_was_demonstrated_and_a_search_is_not():
     """A search exerts the friction that it has learned."""
     shown = searching(friction=0.5)
     phases = {
-        kind: read_phase(learned(registry().skill(kind), [shown], LearnOptions(settings={"friction": friction})))
-        for kind, friction in (("spiral", None), ("search", None), ("random_walk", 0.0))
+        algorithm: read_phase(learned(registry().skill("search"), [shown], LearnOptions(settings=settings)))
+        for algorithm, friction in (("spiral", None), ("sampling", None), ("random_walk", 0.0))
+        for settings in ({"algorithm": algorithm, "friction": friction},)
     }
     found = phases["spiral"]
     assert found.evidence["friction"] == pytest.approx(0.5, rel=0.1)  # bins of 40 ms, slow ones included
     assert dead_band(0.5, Gains(found.push.force, found.stiffness.translation)) < 0.001
-    assert all(phases[kind].stiffness.translation == STIFFNESS for kind in ("search", "random_walk"))
+    assert all(phases[kind].stiffness.translation == STIFFNESS for kind in ("sampling", "random_walk"))
 
 
 def test_a_spiral_with_a_radius_looks_everywhere_within_it_and_each_pass_is_finer():

@@ -12,15 +12,15 @@ from skillframe_search.phase import read_phase
 from skillframe_search.plan import area, exerted, keyed, plan
 
 from skillframe.demonstration.record import Demonstration
-from skillframe.document.source import learned
+from skillframe.document.file import learned
 from skillframe.errors import InputError, UnknownName
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import matrix_from_quaternion, norm, quaternion_from_matrix, rotation_matrix
 
 
-def learn(demonstrations, kind="search", axes="base", at=None, **settings):
-    return learned(registry().skill(kind), demonstrations, LearnOptions(at=at, axes=axes, settings=settings))
+def learn(demonstrations, axes="base", at=None, **settings):
+    return learned(registry().skill("search"), demonstrations, LearnOptions(at=at, axes=axes, settings=settings))
 
 
 def phase_of(*demonstrations, **options):
@@ -48,6 +48,7 @@ def changed(demonstration, **fields):
     return Demonstration(**{**values, **fields})
 
 
+@pytest.mark.slow
 def test_the_gaussian_is_that_of_the_places_against_the_start():
     """The made-up search is scaled to its own standard deviation, so that the truth is exact up to binning."""
     given = searching(deviation=(0.006, 0.003))
@@ -57,6 +58,7 @@ def test_the_gaussian_is_that_of_the_places_against_the_start():
     np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), away.std(axis=0), rtol=0.02)
 
 
+@pytest.mark.slow
 def test_a_planar_search_is_learned_as_planar_and_a_turning_one_in_three_dimensions():
     flat = searching()
     assert phase_of(flat).searched == ("across_1", "across_2")
@@ -69,6 +71,7 @@ def test_a_planar_search_is_learned_as_planar_and_a_turning_one_in_three_dimensi
 
 
 @pytest.mark.parametrize("shift", [(0.3, -0.2, 0.1), (-1.0, 2.0, 0.5)])
+@pytest.mark.slow
 def test_moving_the_whole_task_changes_nothing(shift):
     given = searching()
     one, two = phase_of(given), phase_of(moved(given, shift))
@@ -77,6 +80,7 @@ def test_moving_the_whole_task_changes_nothing(shift):
     np.testing.assert_allclose(one.push.direction, two.push.direction, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_in_the_axes_of_the_start_turning_the_whole_task_changes_nothing():
     given = searching()
     one = phase_of(given, axes="phase_start")
@@ -100,6 +104,7 @@ def test_the_axes_along_the_surface_are_orthonormal_for_any_push():
 
 
 @pytest.mark.parametrize("friction", [0.1, 0.2, 0.4])
+@pytest.mark.slow
 def test_the_force_model_finds_coulomb_s_ratio_all_ways(friction):
     """At 15 mm/s, within the demonstrated speeds, the exerted force leads along the motion by mu times the push.
 
@@ -160,14 +165,16 @@ def test_the_way_into_the_hole_is_cut():
     assert len(kept.place) > 0.8 * len(found.place)
 
 
+@pytest.mark.slow
 def test_a_speed_is_learned_within_reason_unless_one_is_given():
     assert 0.005 <= phase_of(searching()).path.speed <= 0.02
     assert phase_of(searching(), speed=0.013).path.speed == 0.013
 
 
+@pytest.mark.slow
 def test_the_area_holds_every_place_of_the_search():
-    for kind in ("search", "spiral", "random_walk"):
-        document = learn([searching()], kind, speed=0.015, time=6.0)
+    for algorithm in ("sampling", "spiral", "random_walk"):
+        document = learn([searching()], algorithm=algorithm, speed=0.015, time=6.0)
         low, high = area(document)
         place = plan(keyed(read_phase(document)), 1).place[:, :3]
         # smoothing may swing out of a corner by a fraction of a millimetre
@@ -194,9 +201,9 @@ def test_unknown_settings_points_and_axes_are_refused():
     with pytest.raises(UnknownName, match="tip"):
         learn([searching()], at="tipp")
     with pytest.raises(InputError, match="algorithm"):
-        learn([searching()], algorithm="spiral")
+        learn([searching()], algorithm="spirals")
     with pytest.raises(InputError, match="layers"):
-        learn([searching()], "spiral", layers=3)
+        learn([searching()], algorithm="spiral", layers=3)
 
 
 @pytest.mark.parametrize(
@@ -208,6 +215,7 @@ def test_unknown_settings_points_and_axes_are_refused():
         ("stop.time_s", 1e4, "300 s"), ("path.reach", 1e-6, "reach"),
     ],
 )  # fmt: skip
+@pytest.mark.slow
 def test_a_broken_document_is_refused_by_key(key, value, said):
     document = json.loads(json.dumps(learn([searching()])))
     place = document["phases"][0]

@@ -15,7 +15,7 @@ TIP = [0.0, 0.0, 0.2]
 def document(tmp_path, monkeypatch):
     """search.json at the tip, 4 s, within some 10 mm of the start."""
     monkeypatch.chdir(tmp_path)
-    found = example("search")
+    found = example()
     save(
         {**found, "frame": {**found["frame"], "learned_at": TIP, "center_of_compliance": TIP}}, tmp_path / "search.json"
     )
@@ -57,6 +57,7 @@ def test_demonstrations_that_never_touch_teach_no_search(tmp_path, monkeypatch, 
     assert not (tmp_path / "never.json").exists()
 
 
+@pytest.mark.slow
 def test_a_search_that_never_touches_ends_with_exit_1_a_sentence_and_its_trace(document, tmp_path, capsys):
     above = ["--set", "start.offset_z=0.05", "--out", "run.npz", "--duration", "6"]
     assert run(["run", "search.json", "--world", "peg_in_hole", "--robot", "free_tool", *above]) == 1
@@ -83,9 +84,10 @@ def test_a_campaign_with_a_search_area_outside_the_workspace_is_refused_before_i
     assert not (tmp_path / "results" / "results.csv").exists()
 
 
+@pytest.mark.slow
 def test_without_a_stated_workspace_an_arm_s_is_what_it_reaches(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    found = example("search")
+    found = example()
     phase = found["phases"][0]
     wide = {**phase["exploration"], "covariance": [[0.04, 0.0], [0.0, 0.04]]}  # 0.2 m: half a metre each way
     save({**found, "phases": [{**phase, "exploration": wide}]}, tmp_path / "wide.json")

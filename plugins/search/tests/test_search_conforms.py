@@ -1,11 +1,14 @@
-"""The three searches obey the laws of the loop's contract."""
+"""A search obeys the laws of the loop's contract. `test_every_installed_plugin_conforms` checks every kind of skill."""
 
 import numpy as np
 import pytest
+from skillframe_search.example import example
+from skillframe_testkit.suites import SkillConformance, random_observations
 
 from skillframe.extend.registry import registry
 from skillframe.skill import rows_of
-from skillframe.testing import SkillConformance, random_observations
+
+pytestmark = pytest.mark.slow
 
 
 class TestSearch(SkillConformance):
@@ -13,23 +16,24 @@ class TestSearch(SkillConformance):
 
 
 class TestSpiral(SkillConformance):
-    skill_type = "spiral"
+    skill_type = "search"
+
+    @property
+    def document(self):
+        return example("spiral")
 
 
 class TestRandomWalk(SkillConformance):
-    skill_type = "random_walk"
+    skill_type = "search"
 
-
-@pytest.mark.slow
-class TestSeat(SkillConformance):
-    skill_type = "seat"
+    @property
+    def document(self):
+        return example("random_walk")
 
 
 def test_a_trial_that_begins_anew_does_what_it_would_alone():
     """Bit for bit: a search entered late by one trial of a batch, as a composition does it."""
-    from skillframe_search.example import example
-
-    document, rng = example("search"), np.random.default_rng(3)
+    document, rng = example(), np.random.default_rng(3)
     seen = random_observations(rng, 3, 30, 0.02)
     skill, alone = (registry().skill("search").build(document) for _ in range(2))
     skill.start(seen[0], [np.random.default_rng(i) for i in range(3)])

@@ -26,17 +26,18 @@ BUDGETS = (3.0, 7.0, 13.4, 20.0)
 
 
 @cache
-def found(kind, task, budget, settings=()):
+def found(algorithm, task, budget, settings=()):
     """Seconds to the find per goal (inf where not found within the budget), and print a row."""
     world, believed, centre = task
     where = goals(COUNT, believed, centre)
-    learned = document(kind, world, believed, centre, time=budget, **dict(settings))
+    learned = document(world, believed, centre, algorithm=algorithm, time=budget, **dict(settings))
     result, seconds = search(learned, world, where, duration=budget + 2.0)
     row = "  ".join(f"{b:g} s {s:.2f}" for b, s in zip(BUDGETS, shares(seconds, BUDGETS), strict=True) if b <= budget)
     low, high = wilson(int((seconds <= budget + 2.0).sum()), COUNT)
     what = ", ".join(f"{key}={value}" for key, value in settings)
     print(
-        f"\n{world:12s} {kind:12s} {what:44s} {row}  [{low:.2f}, {high:.2f}]  peak {result.peak_force_n.max():.0f} N",
+        f"\n{world:12s} {algorithm:12s} {what:44s} {row}  [{low:.2f}, {high:.2f}]  "
+        f"peak {result.peak_force_n.max():.0f} N",
         end="",
     )
     return seconds
@@ -62,14 +63,14 @@ def walk():
 
 @pytest.mark.parametrize("algorithm", ["sampling", "ergodic"])
 def test_the_planar_search_finds_three_quarters_in_20_s_and_30_points_more_than_a_random_walk(algorithm, walk):
-    reached = share(found("search", PLANAR, 20.0, (("algorithm", algorithm),)), 20.0)
+    reached = share(found(algorithm, PLANAR, 20.0), 20.0)
     assert reached >= 0.75
     assert reached >= walk["peg_in_hole"] + 0.30
 
 
 @pytest.mark.parametrize("algorithm", ["sampling", "ergodic"])
 def test_the_search_in_three_dimensions_finds_60_percent_in_20_s_and_30_points_more_than_a_random_walk(algorithm, walk):
-    reached = share(found("search", SOCKET, 20.0, (("algorithm", algorithm),)), 20.0)
+    reached = share(found(algorithm, SOCKET, 20.0), 20.0)
     assert reached >= 0.60
     assert reached >= walk["socket"] + 0.30
 
@@ -85,14 +86,14 @@ def test_spirals_in_three_dimensions_are_shown_in_one_layer_and_in_three():
 
 
 def test_with_the_wrong_centre_the_search_leads_the_spiral_by_15_points_at_7_s():
-    learned = share(found("search", SHIFTED, 7.0), 7.0)
+    learned = share(found("sampling", SHIFTED, 7.0), 7.0)
     assert learned >= share(found("spiral", SHIFTED, 7.0), 7.0) + 0.15
 
 
 def test_on_a_soft_arm_learned_forces_lead_a_constant_push_by_15_points():
     soft = (("stiffness", 500.0),)
-    learned = share(found("search", PLANAR, 13.4, soft), 13.4)
-    assert learned >= share(found("search", PLANAR, 13.4, (*soft, ("feedforward", "constant"))), 13.4) + 0.15
+    learned = share(found("sampling", PLANAR, 13.4, soft), 13.4)
+    assert learned >= share(found("sampling", PLANAR, 13.4, (*soft, ("feedforward", "constant"))), 13.4) + 0.15
 
 
 def test_planning_takes_less_than_a_second():
@@ -102,7 +103,7 @@ def test_planning_takes_less_than_a_second():
     from skillframe_search.plan import keyed, plan
 
     for task, algorithm in ((PLANAR, "sampling"), (SOCKET, "sampling"), (PLANAR, "ergodic"), (SOCKET, "ergodic")):
-        phase = keyed(read_phase(document("search", *task, algorithm=algorithm)))
+        phase = keyed(read_phase(document(*task, algorithm=algorithm)))
         plan(phase, 0)  # imports and the program's sparsity
         began = perf_counter()
         plan(phase, 1)
@@ -113,7 +114,7 @@ def test_planning_takes_less_than_a_second():
 
 def test_what_five_demonstrations_teach():
     for task in (PLANAR, SHIFTED, SOCKET):
-        learned = document("search", *task)["phases"][0]["exploration"]
+        learned = document(*task)["phases"][0]["exploration"]
         deviation = np.sqrt(np.diag(learned["covariance"]))
         pairs = zip(learned["coordinates"], learned["mean"], deviation, strict=True)
         text = "  ".join(f"{name} {1e3 * mean:+.2f} +- {1e3 * spread:.2f}" for name, mean, spread in pairs)
@@ -139,7 +140,7 @@ def insertions(searching, count, seed, widest):
     task = load_world("peg_in_hole", {**PEG, "done_depth": 0.045})
     skill = recovery.inserting()
     if searching:
-        skill = recovery.recovering(document("search", *PLANAR, time=SEARCH_S))
+        skill = recovery.recovering(document(*PLANAR, time=SEARCH_S))
     setup = Setup(robot=robot(), scene=task, center_of_compliance=np.array(recovery.TIP), stop_when=task.goal)
     draws = {**starts(where), "start.offset_z": np.full(count, 0.004)}
     rngs = [np.random.default_rng([9, i]) for i in range(count)]

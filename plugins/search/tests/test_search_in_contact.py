@@ -1,26 +1,23 @@
 """Searches in the simulated world: short runs that end in each way there is."""
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from search_runs import PARAMS, document, goals, robot, scene, search
 from skillframe_search.example import example
+from skillframe_teaching.blind import BlindSettings, record_blind
 
-from skillframe.errors import InputError
 from skillframe.execution.executor import simulate
 from skillframe.execution.prepare import load_world, prepare
 from skillframe.skill import Status
-from skillframe.teaching.blind import BlindSettings
-from skillframe.teaching.blind_sessions import record_blind
 
 PLANE = (0.004, 0.004, 0.0)
 
 
-def given(kind="search", **changes):
+def given(algorithm="sampling", **changes):
     """An example document at the tip: 4 s of search around the start, no simulated demonstration needed."""
-    found = example(kind)
+    found = example(algorithm)
     phase = found["phases"][0]
     for key, value in changes.items():
         group, _, name = key.partition("__")
@@ -29,39 +26,35 @@ def given(kind="search", **changes):
     return {**found, "frame": frame}
 
 
-def run(found, world="peg_in_hole", offset=(0.0, 0.0, 0.0), count=1, machine=None, duration=6.0, params=None):
-    task = load_world(world, {**PARAMS.get(world, {}), **(params or {})})
-    skill, setup = prepare(machine or robot(), task, found)
-    draws = {f"start.offset_{axis}": np.full(count, value) for axis, value in zip("xyz", offset, strict=True)}
+def run(found, offset, count=1, duration=6.0, params=None):
+    skill, setup = prepare(robot(), load_world("peg_in_hole", {**PARAMS["peg_in_hole"], **(params or {})}), found)
+    draws = {f"start.offset_{axis}": np.broadcast_to(value, count) for axis, value in zip("xyz", offset, strict=True)}
     rngs = [np.random.default_rng([1, i]) for i in range(count)]
     return simulate(skill, setup, draws, rngs, duration_s=duration, trace_hz=100.0)
 
 
-def test_a_spiral_finds_a_hole_2_mm_away_and_says_so():
-    result = run(given("spiral"), offset=(0.002, 0.0, 0.0))
-    assert result.success[0]
-    assert result.reason[0].startswith("fell in after")
-
-
-def test_it_starts_in_contact_as_well_as_slightly_above():
-    for height in (-0.001, 0.003):
-        assert run(given("spiral"), offset=(0.002, 0.0, height)).success[0]
+@pytest.mark.slow
+def test_a_spiral_finds_a_hole_2_mm_away_and_says_so_from_contact_as_well_as_slightly_above():
+    result = run(given("spiral"), offset=(0.002, 0.0, np.array([0.0, -0.001, 0.003])), count=3)
+    assert result.success.all()
+    assert all(reason.startswith("fell in after") for reason in result.reason)
 
 
 @cache
 def beside():
-    """Two searches where there is no hole."""
-    return run(given("spiral"), offset=(0.019, 0.0, 0.0), count=2)
+    """Two searches of 2 s where there is no hole."""
+    return run(given("spiral", stop__time_s=2.0), offset=(0.019, 0.0, 0.0), count=2)
 
 
 def test_where_there_is_no_hole_it_fails_in_its_time_and_does_not_cry_found():
     result = beside()
     assert (result.status == Status.FAILURE).all()
     assert all("did not fall in" in reason for reason in result.reason)
-    # 1 mm of approach and 3 N at 1000 N/m, both at 5 mm/s, take 0.8 s; then 4 s of search
-    np.testing.assert_allclose(result.duration_s, 4.8, atol=0.2)
+    # 1 mm of approach and 3 N at 1000 N/m, both at 5 mm/s, take 0.8 s; then 2 s of search
+    np.testing.assert_allclose(result.duration_s, 2.8, atol=0.2)
 
 
+@pytest.mark.slow
 def test_it_presses_with_its_push_while_it_slides():
     """Ten newtons within 3 % in the mean, once the push has grown. The sensor's bias is removed by the tare."""
     trace = beside().traces[0]
@@ -69,23 +62,7 @@ def test_it_presses_with_its_push_while_it_slides():
     assert trace.wrench_true[late, 2].mean() == pytest.approx(10.0, rel=0.03)
 
 
-def test_a_search_that_never_touches_the_surface_fails_in_a_sentence():
-    result = run(given(), offset=(0.0, 0.0, 0.05))
-    assert result.status[0] == Status.FAILURE
-    assert "touched no surface within" in result.reason[0]
-    assert "start the search nearer" in result.reason[0]
-
-
-def test_a_search_area_outside_the_workspace_is_refused_in_a_sentence():
-    machine = robot()
-    x, y, z = machine.spec.workspace.fixture
-    box = ((x - 0.5, y - 0.5, z - 0.5), (x + 0.004, y + 0.5, z + 0.5))  # the search reaches 10 mm
-    small = replace(machine, spec=replace(machine.spec, limits=replace(machine.spec.limits, workspace_m=box)))
-    with pytest.raises(InputError, match="leaves the workspace") as caught:
-        run(given(), machine=small)
-    assert "\n" not in str(caught.value)
-
-
+@pytest.mark.slow
 def test_what_was_learned_at_the_wrist_presses_alike_at_the_tip():
     """The same search with its centre elsewhere: the feed-forward is moved, the way of the tip is the same."""
     at_tip = given()
@@ -96,9 +73,10 @@ def test_what_was_learned_at_the_wrist_presses_alike_at_the_tip():
 
 
 @pytest.mark.slow
+@pytest.mark.figures
 def test_a_blind_person_s_searches_teach_one_that_finds_the_hole():
     """The whole chain on 8 goals: at least half found in 20 s, where a random walk finds a quarter."""
-    learned = document("search", "peg_in_hole", PLANE)
+    learned = document("peg_in_hole", PLANE)
     result, seconds = search(learned, "peg_in_hole", goals(8, PLANE))
     assert np.isfinite(seconds).sum() >= 4
     assert not any(reason.startswith("fell in") for reason in result.reason[~result.success])
@@ -107,7 +85,7 @@ def test_a_blind_person_s_searches_teach_one_that_finds_the_hole():
 @pytest.mark.slow
 def test_the_learned_spread_and_force_are_near_the_person_s():
     """Believed 4 mm: he stops where he finds it and shows less. Within 40 %. Pushed with 10 N, within 10 %."""
-    phase = document("search", "peg_in_hole", PLANE, push=None)["phases"][0]
+    phase = document("peg_in_hole", PLANE, push=None)["phases"][0]
     deviation = np.sqrt(np.diag(phase["exploration"]["covariance"]))
     assert ((deviation > 0.0024) & (deviation < 0.0056)).all()
     assert phase["push"]["force"] == pytest.approx(10.0, rel=0.1)

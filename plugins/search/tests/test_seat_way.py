@@ -8,14 +8,15 @@ import pytest
 from seat_played import DOWN, Played, known, searching
 from skillframe_search.example import seated
 from skillframe_search.seat import SEARCHING
-from skillframe_search.seat_learner import _way_begins
+from skillframe_search.seat_learner import way_begins
 from skillframe_search.seat_words import NOWHERE, describe, goes_nowhere
+from skillframe_search.straight import straight_push
 
-from skillframe.document.source import learned
+from skillframe.document.file import learned
 from skillframe.errors import InputError
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
-from skillframe.frames import quaternion_from_matrix
+from skillframe.frames import quaternion_from_matrix, rotation_matrix
 from skillframe.skill import Impedance
 
 
@@ -27,7 +28,7 @@ def tip_path(*corners):
 def test_the_way_of_loose_parts_is_where_the_tip_came_from_and_not_where_it_slid():
     # straight down through a wide hole, then 2 mm aside on the shoulder, which is the first that is touched
     path = tip_path((0.0, 0.0, 0.02), (0.0, 0.0, 0.001), (0.002, 0.0, 0.0))
-    begins = _way_begins(path, 100)
+    begins = way_begins(path, 100)
     way = (path[-1] - begins) / np.linalg.norm(path[-1] - begins)
     assert np.degrees(np.arccos(-way[2])) < np.degrees(0.002 / 0.02) + 0.1  # the slide over all of the length
     slid = path[-1] - path[100]
@@ -36,18 +37,18 @@ def test_the_way_of_loose_parts_is_where_the_tip_came_from_and_not_where_it_slid
 
 def test_where_contact_begins_early_or_the_tip_came_from_aside_the_way_begins_at_the_contact():
     down = tip_path((0.0, 0.0, 0.02), (0.0, 0.0, 0.012), (0.0, 0.0, 0.0))
-    np.testing.assert_array_equal(_way_begins(down, 100), down[100])
+    np.testing.assert_array_equal(way_begins(down, 100), down[100])
     aside = tip_path((0.04, 0.0, 0.02), (0.0, 0.0, 0.01), (0.0, 0.0, 0.0))
-    np.testing.assert_array_equal(_way_begins(aside, 100), aside[100])
+    np.testing.assert_array_equal(way_begins(aside, 100), aside[100])
     shallow = tip_path((0.0, 0.0, 0.02), (0.0, 0.0, 0.004), (0.0, 0.0, 0.0))  # a free way down, then a shallow hole
-    np.testing.assert_array_equal(_way_begins(shallow, 100), shallow[100])
-    np.testing.assert_array_equal(_way_begins(shallow, 100, 0.002), shallow[100])
+    np.testing.assert_array_equal(way_begins(shallow, 100), shallow[100])
+    np.testing.assert_array_equal(way_begins(shallow, 100, 0.002), shallow[100])
 
 
 def test_where_it_rests_as_soon_as_it_touches_the_way_is_the_one_that_it_came():
     bottom = tip_path((0.0, 0.0, 0.006), (0.0, 0.0, 0.001), (0.0, 0.0, 0.0))
-    np.testing.assert_array_equal(_way_begins(bottom, 100, 0.002), bottom[0])
-    np.testing.assert_array_equal(_way_begins(bottom, 100), bottom[100])
+    np.testing.assert_array_equal(way_begins(bottom, 100, 0.002), bottom[0])
+    np.testing.assert_array_equal(way_begins(bottom, 100), bottom[100])
 
 
 def resting(high_m, *forces):
@@ -94,6 +95,62 @@ def test_the_end_is_that_of_the_demonstration_that_went_deepest():
     assert seat["contact_m"] == pytest.approx(alone + 0.0002, abs=5e-5)
     _, height = end_of(resting(0.0, 10.0), resting(0.0004, 10.0), place="start")  # both went as far: neither is short
     assert height == pytest.approx(0.2, abs=0.05)
+
+
+def removal_of(one, aside=(0.003, -0.002, 0.001), angle=0.1):
+    """A record of taking the part out: a demonstration backwards, elsewhere and turned about the way."""
+    back = replace(
+        one, time=one.time[-1] - one.time[::-1], position=one.position[::-1] + np.array(aside),
+        quaternion=one.quaternion[::-1], wrench=-one.wrench[::-1],
+    )  # fmt: skip
+    return yawed(back, angle)
+
+
+def test_a_removal_gives_place_way_and_orientation_and_the_push_goes_straight_along_the_way():
+    one = seated(0.0)
+    out = removal_of(one, angle=0.1 + np.linspace(0.0, 0.02, len(one.time)))  # it turns on its way out
+    mine = learned_of(out, removal=True)
+    seat = mine["seat"]
+    tip = out.pose.at(np.array(seat["point"])).position
+    np.testing.assert_allclose(seat["end"], tip[0], atol=1e-12)
+    np.testing.assert_allclose(rotation_matrix(np.array(seat["orientation"])), out.pose.rotation[0], atol=1e-9)
+    # the principal direction of the samples, whatever noise the first and the last have
+    (value, vectors) = np.linalg.eigh(np.cov(tip.T))
+    assert abs(vectors[:, np.argmax(value)] @ seat["way"]) == pytest.approx(1.0, abs=1e-9)
+    assert seat["contact_m"] == pytest.approx((tip[0] - tip[-1]) @ seat["way"])
+    np.testing.assert_allclose(mine["phases"][0]["translation"]["desired_direction"], seat["way"], atol=1e-12)
+    assert any(line.startswith("by hand (our choice): the push;") for line in describe(mine))
+
+
+def test_whether_something_stops_the_part_is_said_since_a_removal_does_not_show_it():
+    out = removal_of(seated(0.0))
+    assert learned_of(out, removal=True)["seat"]["stop_m"] == 0.0
+    assert learned_of(out, removal=True, stopped=False)["seat"]["stop_m"] > 0.0
+
+
+def test_a_removal_that_goes_nowhere_or_not_straight_is_refused_and_settings_of_a_learned_push_with_it():
+    one = removal_of(seated(0.0), angle=0.0)
+    rests = replace(one, position=np.repeat(one.position[:1], len(one.time), axis=0))
+    angle = np.linspace(0.0, 0.8 * np.pi, len(one.time))
+    arc = one.position[:1] + 0.02 * np.column_stack([np.cos(angle), np.zeros_like(angle), np.sin(angle)])
+    for each in (rests, replace(one, position=arc)):
+        with pytest.raises(InputError, match="until the part is out"):
+            learned_of(each, removal=True)
+    for name, value in {"moving_m": 0.002, "skill": "dmp"}.items():
+        with pytest.raises(InputError, match=f"--set {name}: is of a learned push"):
+            learned_of(one, removal=True, **{name: value})
+
+
+def test_a_straight_push_in_another_direction_is_the_one_down_turned():
+    frames = {"tip": (0.0, 0.0, 0.2)}
+    turn = rotation_matrix(np.array([0.4, -1.1, 0.3]))
+    down, other = (straight_push(frames, way)["phases"][0]["translation"]
+                   for way in (np.array([0.0, 0.0, -1.0]), turn @ [0.0, 0.0, -1.0]))  # fmt: skip
+    for key in ("stiffness", "damping"):
+        np.testing.assert_allclose(other[key], turn @ np.array(down[key]) @ turn.T, atol=1e-9)
+    free = np.array(other["compliant_axes"])
+    np.testing.assert_allclose(free @ free.T, np.eye(2), atol=1e-12)
+    np.testing.assert_allclose(free @ other["desired_direction"], 0.0, atol=1e-12)
 
 
 def test_where_all_rest_without_pressing_nothing_stops_the_part_and_the_end_is_their_mean():
@@ -151,12 +208,12 @@ def test_a_search_keeps_its_lead_where_nothing_stops_the_part():
     np.testing.assert_allclose((command.pose.position - played.seen().pose.position)[there, 2], -0.010, atol=1e-9)
 
 
-def test_a_part_is_settled_where_that_is_asked_for():
-    assert end_of(resting(0.0, 10.0))[0]["settle_s"] == 0.0
-    assert end_of(resting(0.0, 10.0), settle=0.5)[0]["settle_s"] == 0.5
-    said = describe(learned(registry().skill("seat"), [resting(0.0, 10.0)], LearnOptions(settings={"settle": 0.5})))
-    assert any(line.startswith("settle:") for line in said)
-    assert not any(line.startswith("settle:") for line in describe(learned_of(resting(0.0, 10.0))))
+def test_a_part_is_settled_unless_that_is_left_out():
+    assert end_of(resting(0.0, 10.0))[0]["settle_s"] == 0.5
+    assert end_of(resting(0.0, 10.0), settle=0.0)[0]["settle_s"] == 0.0
+    assert any(line.startswith("settle:") for line in describe(learned_of(resting(0.0, 10.0))))
+    none = learned(registry().skill("seat"), [resting(0.0, 10.0)], LearnOptions(settings={"settle": 0.0}))
+    assert not any(line.startswith("settle:") for line in describe(none))
 
 
 def test_who_lets_go_at_a_bottom_has_pressed_on_it_before():
@@ -189,7 +246,7 @@ def test_demonstrations_that_end_leaning_are_told_of_and_a_turn_about_the_way_is
 def test_what_is_screwed_in_is_refused_and_what_is_aligned_about_its_way_is_not():
     """Turned about the way from the contact, at 1.5 s, to the end: 20 degrees are a screw, 10 are not, nor are both."""
     inside = np.clip((seated(0.0).time - 1.5) / 1.2, 0.0, 1.0)
-    with pytest.raises(InputError, match=r"turned by 20 degrees about its way.*leave --exception out"):
+    with pytest.raises(InputError, match=r"turned by 20 degrees about its way.*leave --skill seat out"):
         learned_of(yawed(seated(0.0), np.radians(20.0) * inside))
     twisted = yawed(seated(0.0), np.radians(20.0) * inside)  # as people twist a round peg while they push it in
     assert learned_of(twisted, round=True)["phases"][0]["rotation"]["desired_direction"] is None

@@ -63,6 +63,7 @@ def test_a_tour_spreads_as_the_distribution_says():
     np.testing.assert_allclose(path.std(axis=0), deviation, rtol=0.25)
 
 
+@pytest.mark.slow
 def test_the_coefficients_of_the_normal_are_its_integrals():
     basis = control._Basis(np.array([0.0128, 0.0096]), 6)
     rng = np.random.default_rng(0)

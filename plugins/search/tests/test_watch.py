@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from skillframe_search.phase import Push, Stop
-from skillframe_search.watch import Watch
+from skillframe_search.runtime import Watch
 
 from skillframe.frames import Pose
 from skillframe.skill import Observation

@@ -7,12 +7,12 @@ import pytest
 from skillframe_segmenter.air import learned_in_air
 
 from skillframe.demonstration.record import Demonstration
-from skillframe.document.source import learned
+from skillframe.document.file import learned
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
 
 RATE, SPEED = 200.0, 0.02
-OFF = np.deg2rad(36.0)  # a cone of three quarters of it, 27 degrees, would be needed, and 25 are allowed
+OFF = np.deg2rad(36.0)  # 2.4 standard deviations of an aim: none is explained from the middle
 
 
 def aslant(length, force=0.0):
@@ -35,32 +35,29 @@ def aslant(length, force=0.0):
     return result
 
 
-def translation(demonstrations, **settings):
+def translation(demonstrations):
     learn = registry().skill("lmc").learn
-    return learned_in_air(learn, demonstrations, LearnOptions(settings=settings))["phases"][0]["translation"]
+    return learned_in_air(learn, demonstrations, LearnOptions())["phases"][0]["translation"]
 
 
 def test_three_short_ways_about_the_vertical_are_a_push_along_it():
     alone = registry().skill("lmc").learn(aslant(0.009), LearnOptions())["phases"][0]["translation"]
     assert alone["desired_direction"] is None  # or the test would show nothing
     found = translation(aslant(0.009))
-    # 3 degrees: the learner's last search has a disc of that radius
+    # noise tilts intervals of 1 mm by about a degree
     assert -found["desired_direction"][2] > np.cos(np.deg2rad(3.0))
-    # the search's cells are 1.6 degrees wide, and noise tilts intervals of 1 mm by about a degree
-    assert np.degrees(found["evidence"]["pyramid_angle_rad"]) == pytest.approx(27.0, abs=2.0)
-    assert "taken as it went" in found["evidence"]["message"]
+    assert "taken as it went" in found["evidence"]["message"] and "off by 36 degrees" in found["evidence"]["message"]
 
 
 @pytest.mark.parametrize(
-    ("why", "length", "force", "settings"),
+    ("why", "length", "force"),
     [
-        ("a way as long as this would have averaged the hand's wandering out", 0.03, 0.0, {}),
-        ("what touched may have turned the tool aside", 0.009, 5.0, {}),
-        ("a person gave a bound", 0.009, 0.0, {"pyramid_max_rad": np.deg2rad(25.0)}),
+        ("a way as long as this would have averaged the hand's wandering out", 0.03, 0.0),
+        ("what touched may have turned the tool aside", 0.009, 5.0),
     ],
 )
-def test_what_is_long_or_touches_or_was_bounded_is_left_as_it_was_learned(why, length, force, settings):
-    assert translation(aslant(length, force), **settings)["desired_direction"] is None, why
+def test_what_is_long_or_touches_is_left_as_it_was_learned(why, length, force):
+    assert translation(aslant(length, force))["desired_direction"] is None, why
 
 
 def test_a_phase_of_a_policy_is_learned_so():

@@ -2,6 +2,7 @@
 
 import copy
 import json
+import re
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -39,34 +40,6 @@ def slides(count=3):
     return [m.demonstration for m in made.demonstrations("ls", 2, count)]
 
 
-def test_a_demonstration_that_shares_no_phase_is_named():
-    with pytest.raises(InputError, match=r"demo3.npz: shares no phase with the other demonstrations"):
-        learn([legs(1, -Z), legs(2, -Z), legs(3, X)])
-
-
-def test_a_demonstration_that_stops_half_way_is_named_with_where_it_stops():
-    whole = slides()
-    half = whole[2].between(0.0, made.demonstrations("ls", 2)[2].changes[0] - 0.1)
-    with pytest.raises(InputError, match=r"demo3.npz: stops half-way: ends in phase 1, .* go on to phase 2"):
-        learn([*whole[:2], half])
-
-
-def test_a_demonstration_that_runs_the_other_way_round_is_named():
-    with pytest.raises(InputError, match=r"demo3.npz: goes through its phases the other way round \(2 - 1\)"):
-        learn([legs(1, -Z, X), legs(2, -Z, X), legs(3, X, -Z)])
-
-
-def test_two_demonstrations_that_run_opposite_ways_are_refused():
-    with pytest.raises(InputError, match="the other way round"):
-        learn([legs(1, -Z, X), legs(3, X, -Z)])
-
-
-@pytest.mark.parametrize("phases", [0, 40])
-def test_more_phases_than_samples_allow_names_the_shortest_demonstration(phases):
-    with pytest.raises(InputError, match=rf"demo\d.npz: is \d.\d\d s long, which allows 1 to \d+ phases, not {phases}"):
-        learn(slides(), phases=phases)
-
-
 def test_a_demonstration_too_short_to_have_phases_says_so():
     with pytest.raises(InputError, match="too short to have phases"):
         learn([slides(1)[0].between(0.0, 0.3)])
@@ -101,15 +74,10 @@ def test_no_demonstration_is_refused():
         ({"set_boundary": ["1:9=1.0"]}, "has no boundary 9"),
     ],
 )
+@pytest.mark.slow
 def test_settings_that_make_no_sense_are_named(settings, words):
     with pytest.raises(SkillframeError, match=words):
         learn(slides(), **settings)
-
-
-def test_a_boundary_moved_out_of_its_demonstration_is_refused():
-    for time in (-1.0, 99.0):
-        with pytest.raises(InputError, match="boundary 1 cannot be at"):
-            learn(slides(), set_boundary=[f"1:1={time}"])
 
 
 ROW = {"file": "a.npz", "start": 1.0, "end": 3.0, "boundaries": [1.5, 2.0], "labels": [0, 1, 0]}
@@ -215,12 +183,12 @@ def files(tmp_path):
     return [tmp_path / "d1.npz", tmp_path / "d2.npz"]
 
 
+@pytest.mark.slow
 def test_segment_writes_a_policy_with_boundaries_and_labels_in_the_order_of_its_arguments(run, files, tmp_path):
     out = tmp_path / "p.json"
-    result = run("segment", *files, "--out", out, "--json")
+    result = run("segment", *files, "--out", out)
     assert result.code == 0, result.err
     document = json.loads(out.read_text())
-    assert json.loads(result.out)["phases"] == document["phases"]
     assert document["format"] == "skillframe.skill" and document["type"] == "policy"
     assert len(document["phases"]) == 2 and "phase_model" in document
     for row, file in zip(document["demonstrations"], files, strict=True):
@@ -228,6 +196,7 @@ def test_segment_writes_a_policy_with_boundaries_and_labels_in_the_order_of_its_
         assert len(row["labels"]) == len(row["boundaries"]) + 1
 
 
+@pytest.mark.slow
 def test_a_boundary_that_a_person_moves_stays_where_it_was_put(run, files, tmp_path):
     first, second = tmp_path / "a.json", tmp_path / "b.json"
     assert run("segment", *files, "--out", first).code == 0
@@ -241,6 +210,7 @@ def test_a_boundary_that_a_person_moves_stays_where_it_was_put(run, files, tmp_p
     assert document["phase_model"]["direction"] != json.loads(first.read_text())["phase_model"]["direction"]
 
 
+@pytest.mark.slow
 def test_boundaries_are_counted_after_phases_are_joined_and_any_of_them_can_be_moved():
     """Joining takes boundaries away that the segmenter has found. Nobody sees those, and they must not come back."""
     demonstrations = [legs(i, X, Z, -X) for i in range(3)]
@@ -259,28 +229,22 @@ def rows_in(document):
     return document["demonstrations"]
 
 
-def test_segment_refuses_in_a_sentence_and_leaves_no_file(run, files, tmp_path):
-    out = tmp_path / "p.json"
-    result = run("segment", *files, "--out", out, "--phases", 99)
-    assert result.code == 2
-    assert "which allows 1 to" in result.err and "Traceback" not in result.err
-    assert not out.exists()
-
-
 @pytest.mark.parametrize("name", ["pose_hmm", "zvc"])
+@pytest.mark.slow
 def test_the_baselines_write_policies_that_are_read_again(run, files, tmp_path, name):
     out = tmp_path / "p.json"
     assert run("segment", *files, "--out", out, "--segmenter", name).code == 0
-    shown = run("skill", "show", out)
+    shown = run("show", out)
     assert shown.code == 0 and "phase 1" in shown.out
 
 
+@pytest.mark.slow
 def test_the_policy_s_tree_prints_as_text(run, files, tmp_path):
     out = tmp_path / "p.json"
     result = run("segment", *files, "--out", out)
     assert "├─ phase 1: push along -z" in result.out
     assert "└─ phase 2:" in result.out and "then the end" in result.out
-    assert run("skill", "show", out).out.count("phase 1") >= 2
+    assert run("show", out).out.count("phase 1") >= 2
 
 
 def half(count=3):
@@ -292,16 +256,22 @@ def half(count=3):
 @pytest.mark.parametrize(
     ("given", "options", "words"),
     [
-        (lambda: [legs(1, -Z), legs(2, -Z), legs(3, X)], (), "d3.npz: shares no phase"),
-        (half, (), "d3.npz: stops half-way"),
-        (lambda: [legs(1, -Z, X), legs(2, -Z, X), legs(3, X, -Z)], (), "d3.npz: goes through its phases the other way"),
-        (slides, ("--phases", "60"), "which allows 1 to"),
-        (slides, ("--phases", "0"), "which allows 1 to"),
+        (lambda: [legs(1, -Z), legs(2, -Z), legs(3, X)], (), "d3.npz: shares no phase with the other demonstrations"),
+        (half, (), "d3.npz: stops half-way: ends in phase 1, .* go on to phase 2"),
+        (
+            lambda: [legs(1, -Z, X), legs(2, -Z, X), legs(3, X, -Z)],
+            (),
+            r"d3.npz: goes through its phases the other way round \(2 - 1\)",
+        ),
+        (lambda: [legs(1, -Z, X), legs(3, X, -Z)], (), "the other way round"),
+        (slides, ("--phases", "60"), r"d\d.npz: is \d.\d\d s long, which allows 1 to \d+ phases, not 60"),
+        (slides, ("--phases", "0"), r"d\d.npz: is \d.\d\d s long, which allows 1 to \d+ phases, not 0"),
         (slides, ("--set-boundary", "1:1=99"), "boundary 1 cannot be at 99 s"),
+        (slides, ("--set-boundary", "1:1=-1"), "boundary 1 cannot be at -1 s"),
         (slides, ("--set-boundary", "7:1=1.0"), "demonstration '7'"),
     ],
-    ids=["no phase shared", "half-way", "other way round", "too many", "none", "boundary outside", "no such file"],
 )
+@pytest.mark.slow
 def test_demonstrations_that_do_not_belong_together_end_segment_with_2_and_a_sentence(
     run, tmp_path, given, options, words
 ):
@@ -311,11 +281,12 @@ def test_demonstrations_that_do_not_belong_together_end_segment_with_2_and_a_sen
         write_demonstration(demonstration, path)
     result = run("segment", *files, "--out", tmp_path / "p.json", *options)
     assert result.code == 2
-    assert words in " ".join(result.err.split()) and "Traceback" not in result.err
+    assert re.search(words, " ".join(result.err.split())) and "Traceback" not in result.err
     assert not (tmp_path / "p.json").exists()
 
 
-@pytest.mark.parametrize("command", [("skill", "show"), ("run", "--world", "corner", "--out", "t.npz")])
+@pytest.mark.parametrize("command", [("show",), ("run", "--world", "corner", "--out", "t.npz")])
+@pytest.mark.slow
 def test_a_policy_file_whose_phase_model_does_not_match_ends_with_2_and_a_sentence(run, files, tmp_path, command):
     out = tmp_path / "p.json"
     assert run("segment", *files, "--out", out).code == 0

@@ -46,7 +46,7 @@ def test_moments_near_a_cut_are_counted_once_and_none_without_cuts():
 def test_chance_is_told_in_words():
     touches = {"changes": 4, "near": 3, "chance": 0.7, "within_s": 0.25}
     found = {"share": 0.62, "chance": 0.3, "p": 0.005, "shifts": 199, "recordings": 3, "cuts": 2, "touches": touches}
-    assert words(found)[0].endswith("turned round in time 30% (p = 0.005, 199 shifts)")
+    assert words(found)[0].endswith("against 30% for time-shifted data (p = 0.005, 199 shifts)")
     assert words(found)[1] == "contact begins or ends 4 times, 3 of them within 0.25 s of a cut; by chance 0.7"
     assert "no better than chance" in words({**found, "p": 0.4})[0]
     many = {**touches, "changes": 46}
@@ -60,5 +60,5 @@ def test_a_share_that_rounds_to_nothing_has_no_sign_and_one_change_is_once():
     touches = {"changes": 1, "near": 0, "chance": 0.1, "within_s": 0.25}
     found = {"share": -0.004, "chance": -0.06, "p": 0.1, "shifts": 199, "recordings": 3, "cuts": 3, "touches": touches}
     share, contact = words(found)
-    assert share.startswith("phases explain 0% of") and "turned round in time -6% (p = 0.1" in share
+    assert share.startswith("phases explain 0% of") and "against -6% for time-shifted data (p = 0.1" in share
     assert contact.startswith("contact begins or ends once, 0 of them")

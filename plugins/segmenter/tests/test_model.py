@@ -141,7 +141,7 @@ def test_em_never_loses_likelihood_while_the_motion_is_fitted(kind):
     settings = Settings()
     prepared = prepare(demonstrations, settings, kind)
     data = em.gather(prepared.seen, prepared.drive, settings)
-    posterior = em._leaky(em._by_time(data.lengths, 2), 2)
+    posterior = em.leaky(em.by_time(data.lengths, 2), 2)
     weights = transitions.prior_weights(2, data.regressors.shape[1], settings.stay_s)
     steps = em._steps(data, transitions.probabilities(weights, data.regressors))
     trail = []
@@ -172,7 +172,7 @@ def test_least_cost_cuts_are_the_cheapest_of_all():
     x = np.concatenate([np.full((6, 1), 0.0), np.full((7, 1), 1.0), np.full((5, 1), -1.0)]) + 0.1 * RNG.normal(
         size=(18, 1)
     )
-    penalty = 6.0 * max(changepoints._local_variance(x), 0.02) * np.log(len(x))
+    penalty = 6.0 * max(changepoints.local_variance(x), 0.02) * np.log(len(x))
 
     def cost(bounds):
         parts = [x[a:b] for a, b in pairwise(bounds)]

@@ -29,6 +29,7 @@ def rows_of(page):
     return json.loads(re.search(r'id="cuts">(.*?)</script>', page.read_text(encoding="utf-8"), re.S)[1])["recordings"]
 
 
+@pytest.mark.slow
 def test_the_line_is_what_was_typed_without_the_boundaries_and_runs(recordings, tmp_path, capsys):
     typed = [*recordings, "--out", "p.json", "--page", "p.html", "--set", "merge_votes=0.7", "--set", "recoveries=0"]
     assert run(["segment", *typed, "--set-boundary", "2:1=1.5"]) == 0
@@ -44,14 +45,6 @@ def test_the_line_is_what_was_typed_without_the_boundaries_and_runs(recordings, 
         each["boundaries"] for each in json.loads((tmp_path / "p.json").read_text())["demonstrations"]
     ]
     assert again[1]["shown"] == row["found"] == row["rest"]
-
-
-def test_with_json_only_the_document_is_on_stdout(recordings, tmp_path, capsys):
-    assert run(["segment", *recordings, "--out", "p.json", "--page", "p.html", "--json"]) == 0
-    told = capsys.readouterr()
-    assert json.loads(told.out)["type"] == "policy"
-    assert "p.html" in told.err
-    assert line_of(tmp_path / "p.html").endswith("--json")
 
 
 def test_a_page_of_another_ending_is_refused_before_the_work(recordings, tmp_path, capsys):

@@ -39,6 +39,7 @@ def test_three_demonstrations_show_two_phases_and_when_they_change(task, seed):
     assert total.largest <= 0.10  # two windows
 
 
+@pytest.mark.slow
 def test_the_peg_s_alignment_is_found_between_two_motions_that_are_one():
     document, taught = found("peg", SEEDS[0])
     for one, row in zip(taught, document["demonstrations"], strict=True):
@@ -46,12 +47,14 @@ def test_the_peg_s_alignment_is_found_between_two_motions_that_are_one():
         np.testing.assert_allclose(row["boundaries"], one.changes, atol=0.20)
 
 
+@pytest.mark.slow
 def test_both_sides_of_a_valley_are_one_phase():
     document, _ = found("valley", SEEDS[0])
     assert {tuple(row["labels"]) for row in document["demonstrations"]} == {(0, 1)}
 
 
 @pytest.mark.parametrize("by", [(0.03, 0.0, 0.0), (-1.0, 2.0, 0.7), (1e3, -1e3, 1.0 / 3.0)])
+@pytest.mark.slow
 def test_where_the_task_stands_changes_nothing_at_all(by):
     """Positions enter through differences only, rounded to 10 nm, so that all results are the same bits."""
     here, taught = found("hose", SEEDS[0])
@@ -155,6 +158,7 @@ def test_the_baseline_of_stops_cuts_where_the_tool_stands_still():
     assert row["boundaries"] == pytest.approx([stop + 0.25], abs=0.1)
 
 
+@pytest.mark.slow
 def test_desired_directions_of_phases_are_told_in_the_document():
     document, _ = found("ls", SEEDS[0])
     first = document["phase_model"]["phase_of"].index(0)

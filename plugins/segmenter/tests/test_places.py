@@ -9,19 +9,20 @@ import numpy as np
 import pytest
 from skillframe_segmenter.placed import Placed, Placement
 from skillframe_segmenter.visits import BASE, visits_of
+from skillframe_teaching.sessions import record
+from skillframe_teaching.teacher import TeacherSettings
 
-from skillframe.demonstration.places import as_plain, places_of
 from skillframe.demonstration.record import Demonstration
-from skillframe.document.source import learned
+from skillframe.document.file import learned
+from skillframe.document.frame import as_plain, places_of
 from skillframe.errors import InputError, UnknownName
 from skillframe.execution.executor import simulate
 from skillframe.execution.prepare import load_robot_model, load_world, prepare
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import Pose, quaternion_from_matrix, rotate, rotate_spatial, rotation_matrix
+from skillframe.sequence import Moved
 from skillframe.skill import Command, Impedance, Observation, Skill, no_reasons
-from skillframe.teaching.sessions import record
-from skillframe.teaching.teacher import TeacherSettings
 
 RATE, PRESS_N = 100.0, 15.0
 BOARD = {  # in the board's frame: a level face, and one that leans by 30 degrees
@@ -111,6 +112,7 @@ def test_a_contact_that_moved_with_no_place_is_in_base():
     assert {visit.place for visit in rows[0]} == {BASE}
 
 
+@pytest.mark.slow
 def test_phases_say_the_same_wherever_the_board_stood():
     turned = Pose(np.array([0.3, 0.2, -0.1]), rotation_matrix([0.2, -0.4, 2.5]))
     one = moved_policy()
@@ -168,7 +170,7 @@ def steps(place, count=200):
         Pose(np.array([0.0, 0.0, 0.04]), np.eye(3)),
         Pose(np.array([0.0, 0.0, 0.01]), rotation_matrix([0.2, 0.0, 0.0])),
     ]
-    skill, commands = Placed(Placement("hole", place, ways, [], 0.2), _Push), []
+    skill, commands = Moved(lambda: Placed(Placement("hole", place, ways, [], 0.2), _Push), place), []
     pose = Pose(*(x[None] for x in place.compose(Pose(np.array([0.05, 0.02, 0.1]), rotation_matrix([0.0, 0.3, 0.0])))))
     for i in range(count):
         wrench = rotate_spatial(place.rotation, np.array([[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]]))
@@ -180,6 +182,7 @@ def steps(place, count=200):
     return commands
 
 
+@pytest.mark.slow
 def test_a_phase_that_is_carried_along_with_its_place_commands_the_same_there():
     place = Pose(np.array([0.4, -0.2, 0.1]), rotation_matrix([0.3, -0.8, 1.9]))
     turn, both = place.rotation, np.kron(np.eye(2), place.rotation)

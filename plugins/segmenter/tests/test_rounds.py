@@ -13,9 +13,9 @@ from skillframe_segmenter.settings import Settings
 
 from skillframe.extend.reading import read_demonstration
 from skillframe.frames import quaternion_from_matrix, rotation_matrix
-from skillframe.paths import recordings_dir
 from tests.figures import quasistatic as made
 from tests.figures.phases import policy
+from tests.references import recordings_dir
 
 RATE, RADIUS = 100.0, 0.05
 HELD = np.diag([1.0, -1.0, -1.0])
@@ -91,11 +91,13 @@ def test_a_hand_that_trembles_in_small_circles_goes_nowhere():
 
 
 @pytest.mark.parametrize("task", ["valley", "ls", "hose", "peg"])
+@pytest.mark.slow
 def test_no_task_of_straight_motions_has_a_round(task):
     prepared = prepare([m.demonstration for m in made.demonstrations(task, 11, noise=15.0)], Settings(), "wrench_hmm")
     assert prepared.going is None
 
 
+@pytest.mark.slow
 def test_what_one_demonstration_of_three_does_by_the_way_is_no_phase():
     wiped, straight = made.demonstrations("wipe", 21), made.demonstrations("ls", 21)
     for chosen, expected in (([*straight[:2], wiped[0]], None), ([*wiped[:2], straight[0]], 2)):
@@ -105,6 +107,7 @@ def test_what_one_demonstration_of_three_does_by_the_way_is_no_phase():
 
 
 @pytest.mark.parametrize("seed", [21, 22])
+@pytest.mark.slow
 def test_a_wipe_between_reach_and_retreat_is_one_phase_and_said_to_be_no_lmc(seed):
     taught = made.demonstrations("wipe", seed)
     document = policy([t.demonstration for t in taught])
@@ -125,6 +128,7 @@ def test_a_wipe_is_followed_online():
         np.testing.assert_allclose([time for time, _ in switches[1:]], one.changes, atol=1.25)
 
 
+@pytest.mark.slow
 def test_all_that_goes_round_is_one_phase_whether_the_number_is_given_or_not():
     wiped = [t.demonstration.between(*t.changes) for t in made.demonstrations("wipe", 23)]
     for phases in (None, 1):
@@ -133,6 +137,7 @@ def test_all_that_goes_round_is_one_phase_whether_the_number_is_given_or_not():
         assert document["phase_model"]["round"] == 0
 
 
+@pytest.mark.slow
 def test_a_moved_boundary_of_the_wipe_stays_where_it_is_put():
     taught = made.demonstrations("wipe", 21)
     there = taught[1].changes[0] + 0.4
@@ -145,6 +150,7 @@ W_FIRST = {"qw": "qx", "qx": "qy", "qy": "qz", "qz": "qw"}
 
 
 @pytest.mark.parametrize("reading", ["as the header says", "w-first and in the tool's axes"])
+@pytest.mark.slow
 def test_the_real_wipe_is_one_phase_alike_in_all_recordings_and_said_to_be_no_lmc(reading):
     """However quaternions are read, the phase has all of the hand's label but half a second at either end."""
     base = recordings_dir()

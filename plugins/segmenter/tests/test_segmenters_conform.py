@@ -1,6 +1,6 @@
 """The three segmenters and the policy obey the laws that every plug-in is held to."""
 
-from skillframe.testing import SegmenterConformance, SkillConformance
+from skillframe_testkit.suites import SegmenterConformance, SkillConformance
 
 
 class TestWrenchHmm(SegmenterConformance):

@@ -1,1 +1,1 @@
-"""Stretches of a recording that are not what happened: steps, copies, saturation, jumps, and what they touch."""
+"""Stretches of a recording that are no valid measurement: steps, copies, saturation and jumps."""

@@ -1,10 +1,9 @@
-r"""Pasted stretches: samples that stand elsewhere in the same recording, bit for bit.
+r"""Copies: samples that occur earlier in the same recording, bit for bit.
 
-Noise never repeats itself. Ten samples are looked for among those before them, in every bit, and a run of repeats at
-one distance is a copy if it lasts 0.25 s, and if chance does not explain it: with p the chance that two increments of
-the channel are equal, \(\sum_v p_v^2\), a run of n samples among N is one of chance with probability below \(N^2
-p^n\), which has to be below \(10^{-6}\). A value that is held counts once, and for as long as it is held. Which of the
-two stretches is the copy shows at their ends: the original goes on smoothly. All of this is our choice.
+A run of at least ten repeated samples at one distance is a copy if it lasts 0.25 s and chance does not explain it: with
+p the probability that two increments of the channel are equal, \(\sum_v p_v^2\), a run of n samples among N occurs by
+chance with probability below \(N^2 p^n\), which has to be below \(10^{-6}\). A held value counts once. The original of
+the two stretches is the one with smoother ends.
 """
 
 from __future__ import annotations
@@ -19,18 +18,12 @@ from skillframe.demonstration.faults.fault import COPY, Flaw
 from skillframe.demonstration.stalls import LEAST_TIME, POSE, starts
 from skillframe.frames import Float
 
-FEWEST, RARE = 10, -np.log(1e-6)
+FEWEST = 10
 Bits = NDArray[np.uint64]
 
 
 def copies(time: Float, pose: Float, wrench: Float) -> list[Flaw]:
-    """Stretches of the whole wrench, of one of its channels, and of the pose that are copies.
-
-    Args:
-        time: (T,) [s].
-        pose: (T, 7) position and quaternion.
-        wrench: (T, 6) as the sensor gave it.
-    """
+    """Copies in the whole wrench (T, 6), in one of its channels, and in the pose (T, 7)."""
     found = [Flaw(COPY, POSE, *span) for span in _copied(time, pose)]
     whole = _copied(time, wrench)
     found += [Flaw(COPY, "wrench", *span) for span in whole]
@@ -41,14 +34,13 @@ def copies(time: Float, pose: Float, wrench: Float) -> list[Flaw]:
 
 
 def _shared(one: tuple[float, float, float], other: tuple[float, float, float]) -> bool:
-    """Whether a copy is a part of another, whichever of the two stretches is called the original."""
     first, last = sorted((one[0], one[2])), sorted((other[0], other[2]))
     length = max(one[1] - one[0], other[1] - other[0])
     return all(abs(a - b) <= length for a, b in zip(first, last, strict=True))
 
 
 def _copied(time: Float, values: Float) -> list[tuple[float, float, float]]:
-    """Start and stop of every copy in (T, n), and where its original starts [s]."""
+    """Start and stop of every copy in (T, n), and the start of its original [s]."""
     fresh = starts(values)
     if len(fresh) < 2 * FEWEST:
         return []
@@ -64,7 +56,7 @@ def _copied(time: Float, values: Float) -> list[tuple[float, float, float]]:
     chosen = np.flatnonzero(distance[edges[:-1]] > 0)
     if not len(chosen):
         return []
-    chance = 2.0 * np.log(len(values)) + RARE
+    chance = 2.0 * np.log(len(values)) - np.log(1e-6)
     rarity = _rarity(values)
     result = []
     for i in chosen:
@@ -78,10 +70,7 @@ def _copied(time: Float, values: Float) -> list[tuple[float, float, float]]:
 
 
 def _bits(values: Float, held: NDArray[np.intp]) -> Bits:
-    """One number (T - 9,) for every ten rows, held (T,) samples longer: equal ones have equal numbers.
-
-    Others have by a chance of 2^-64 only.
-    """
+    """Hash (T - 9,) of every ten rows, held (T,) samples longer. Unequal rows share one with probability 2^-64."""
     raw = np.ascontiguousarray(values + 0.0).view(np.uint64)  # -0.0 is 0.0
     count = len(values) - FEWEST + 1
     row = _mixed(held.astype(np.uint64), raw.T)
@@ -96,7 +85,7 @@ def _mixed(result: Bits, parts: Iterable[Bits]) -> Bits:
 
 
 def _last_equal(bits: Bits) -> NDArray[np.intp]:
-    """Index (T,) of the last earlier sample that is equal, -1 where there is none."""
+    """Index (T,) of the last earlier equal sample, or -1."""
     order = np.argsort(bits, kind="stable")
     equal = bits[order[1:]] == bits[order[:-1]]
     result = np.full(len(bits), -1, dtype=np.intp)
@@ -105,7 +94,7 @@ def _last_equal(bits: Bits) -> NDArray[np.intp]:
 
 
 def _rarity(values: Float) -> float:
-    """-ln of the chance that two increments are equal, for the column of (T, n) that repeats least."""
+    """-ln of the probability of two equal increments, for the least repetitive column of (T, n)."""
     found = []
     for column in values.T:
         counts = np.unique(np.diff(column), return_counts=True)[1]
@@ -115,7 +104,7 @@ def _rarity(values: Float) -> float:
 
 
 def _breaks(values: Float, first: int, last: int) -> float:
-    """How much a stretch breaks off at its ends, in typical steps of each column, the largest."""
+    """The largest step at a stretch's ends, relative to the typical step of each column."""
     typical = np.maximum(np.median(np.abs(np.diff(values, axis=0)), axis=0), 1e-12)
     ends = [np.abs(values[i + 1] - values[i]) / typical for i in (first - 1, last) if 0 <= i < len(values) - 1]
     return float(np.max(ends)) if ends else 0.0

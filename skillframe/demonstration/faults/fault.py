@@ -1,4 +1,4 @@
-"""One stretch of a recording that is not what happened, as an interval, in words and in metadata."""
+"""A fault of a recording, in words and in metadata."""
 
 from __future__ import annotations
 
@@ -14,24 +14,23 @@ KEY = "faults"
 STEP, COPY, SATURATED, JUMP = "step", "copy", "saturation", "jump"
 KINDS = (STEP, COPY, SATURATED, JUMP)
 TOUCHES = {
-    STEP: "what follows may have another bias; a hard touch between two samples can look the same, so all of it counts",
+    STEP: "what follows may have another bias; a hard touch between two samples can do the same, so all of it counts",
     COPY: "what happened then is not known; it counts as neither free air, contact nor noise",
     SATURATED: "the sensor's range ended, and the force was larger; it counts as contact, but not as noise",
     JUMP: "before and after it are two recordings, and no motion leads from one to the other",
 }
-"""By kind, what a fault says of the rest. A step is told and changes nothing: not every one is a fault."""
+"""Consequence of a fault by kind. A step changes nothing, as it may be a real contact."""
 
 
 class Flaw(NamedTuple):
-    """One stretch that is not what happened.
+    """One stretch that is no valid measurement.
 
     Attributes:
         kind: "step", "copy", "saturation" or "jump".
         what: "wrench", one or more of its channels ("fx, tz"), or "pose".
-        start, stop: its first and last sample [s]. A step lasts as long as the new level does, and a jump from the last
-            sample before it to the first after it.
-        value: size of a step [N, Nm] or jump [m], the value of saturation [N, Nm], or where the original of a copy
-            begins [s].
+        start, stop: its first and last sample [s]. A step lasts as long as its level; a jump has its two neighbours.
+        value: size of a step [N, Nm] or jump [m], the value of saturation [N, Nm], or the start of a copy's original
+            [s].
     """
 
     kind: str
@@ -42,11 +41,11 @@ class Flaw(NamedTuple):
 
     @property
     def channels(self) -> list[str]:
-        """Channels of the wrench that it touches."""
+        """Channels of the wrench that it affects."""
         return list(WRENCH) if self.what == "wrench" else [name for name in self.what.split(", ") if name in WRENCH]
 
     def words(self) -> str:
-        """What and where, as a sentence says it."""
+        """What and where, as a clause."""
         span = f"from {self.start:.2f} to {self.stop:.2f} s"
         if self.kind == STEP:
             verb = "step" if "," in self.what else "steps"
@@ -61,7 +60,7 @@ class Flaw(NamedTuple):
         return f"the tool point jumps by {1e3 * self.value:.1f} mm between {self.start:.3f} and {self.stop:.3f} s"
 
     def warning(self, more: int = 0) -> str:
-        """The audit's sentence: what, where, and what it touches, for this one and so many more like it."""
+        """Sentence for the check: what, where, and the consequence, for this one and `more` like it."""
         others = f" (and {more} more)" if more else ""
         return f"{self.kind}: {self.words()}{others}: {TOUCHES[self.kind]}"
 
@@ -70,14 +69,14 @@ class Flaw(NamedTuple):
         return "N" if self.what == "wrench" or self.what.startswith("f") else "Nm"
 
     def within(self, first: float, last: float) -> bool:
-        """Whether it shows in a part of the recording [s]. A step shows by its ends, since a level is no fault."""
+        """Whether it shows in a part of the recording [s]. A step shows by its ends."""
         if self.kind == STEP:
             return first < self.start <= last or first <= self.stop < last
         return self.stop > first and self.start < last
 
     @property
     def acts(self) -> bool:
-        """Whether nothing is concluded or learned from where it is."""
+        """Whether nothing may be concluded or learned from its stretch."""
         return self.kind != STEP
 
 
@@ -106,7 +105,7 @@ def kept(meta: Mapping[str, Any], source: str = "") -> list[Flaw]:
 
 
 def moved(meta: Mapping[str, Any], seconds: float, source: str = "") -> dict[str, Any]:
-    """Metadata whose faults are moved with the clock."""
+    """Metadata whose faults are shifted with the clock."""
     found = [
         f._replace(start=f.start + seconds, stop=f.stop + seconds, value=f.value + seconds * (f.kind == COPY))
         for f in kept(meta, source)

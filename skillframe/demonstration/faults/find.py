@@ -1,4 +1,4 @@
-"""Every fault of a recording, what of its wrench is alive, and the refusal to learn from what did not happen."""
+"""All faults of a recording, its samples with a valid wrench, and the refusal to learn from faults."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.demonstration.content_cache import Once
 from skillframe.demonstration.faults import fault as record
 from skillframe.demonstration.faults.copies import copies
 from skillframe.demonstration.faults.fault import COPY, JUMP, SATURATED, Flaw
-from skillframe.demonstration.faults.jumps import jumps
 from skillframe.demonstration.faults.saturated import saturated
-from skillframe.demonstration.faults.steps import steps
-from skillframe.demonstration.once import Once
+from skillframe.demonstration.faults.steps import jumps, steps
 from skillframe.demonstration.record import Demonstration
 from skillframe.demonstration.stalls import KEY as STALLS
 from skillframe.demonstration.stalls import POSE, Stall, as_meta, every_stall, stalls
@@ -25,12 +24,7 @@ Mask = NDArray[np.bool_]
 
 
 def faults(demonstration: Demonstration, found: Sequence[Stall] | None = None) -> list[Flaw]:
-    """Every fault of a demonstration, by start: those that its metadata name, and those that its samples show.
-
-    Args:
-        demonstration: as read.
-        found: its stalls; looked for if not given.
-    """
+    """All faults of a demonstration, by start: those of its metadata and those of its samples."""
     d = demonstration
     held = stalls(d) if found is None else found
     return every_fault(d.time, np.concatenate([d.position, d.quaternion], axis=1), d.wrench, d.meta, held, d.source)
@@ -39,24 +33,15 @@ def faults(demonstration: Demonstration, found: Sequence[Stall] | None = None) -
 def every_fault(
     time: Float, pose: Float, wrench: Float, meta: Mapping[str, Any], held: Sequence[Stall], source: str = ""
 ) -> list[Flaw]:
-    """Faults that metadata name and faults that samples show.
-
-    Args:
-        time: (T,) [s].
-        pose: (T, 7) position and quaternion.
-        wrench: (T, 6) as the sensor gave it [N, Nm].
-        meta: of the recording.
-        held: its stalls.
-        source: its name, for messages.
-    """
+    """Faults of the metadata and of time (T,) [s], pose (T, 7) and measured wrench (T, 6) [N, Nm]."""
     known = record.kept(meta, source)
-    shown = [f for f in _SHOWN(time, pose, wrench, held=list(held)) if not any(_same(f, k) for k in known)]
+    shown = [
+        f
+        for f in _SHOWN(time, pose, wrench, held=list(held))
+        if not any((f.kind == k.kind and f.start <= k.stop and k.start <= f.stop) for k in known)
+    ]
     found = [f for f in [*known, *shown] if f.within(float(time[0]), float(time[-1]))]
     return sorted(found, key=lambda f: (f.start, f.kind, f.what))
-
-
-def _same(one: Flaw, other: Flaw) -> bool:
-    return one.kind == other.kind and one.start <= other.stop and other.start <= one.stop
 
 
 def _shown(time: Float, pose: Float, wrench: Float, held: Sequence[Stall]) -> list[Flaw]:
@@ -65,25 +50,25 @@ def _shown(time: Float, pose: Float, wrench: Float, held: Sequence[Stall]) -> li
     spans: list[Stall | Flaw] = [*held, *found]
     for span in spans:
         skip |= (time >= span.start) & (time <= span.stop)
-    found += [f for f in jumps(time, pose) if not any(s.what == POSE and _touch(s, f) for s in spans)]
+    found += [
+        f
+        for f in jumps(time, pose)
+        if not any(s.what == POSE and (s.start <= f.stop and f.start <= s.stop) for s in spans)
+    ]
     return found + steps(time, pose, wrench, skip)
 
 
 _SHOWN = Once(_shown)
 
 
-def _touch(one: Stall | Flaw, other: Flaw) -> bool:
-    return one.start <= other.stop and other.start <= one.stop
-
-
 def remembered(time: Float, pose: Float, wrench: Float, meta: Mapping[str, Any], source: str = "") -> dict[str, Any]:
-    """Metadata with the stalls and faults of a wrench that is turned, or smoothed, later, and then hides them."""
+    """Metadata with the stalls and faults of a wrench, before rotation or smoothing hides them."""
     held = every_stall(time, pose, wrench, meta, source)
     return with_named(meta, held, every_fault(time, pose, wrench, meta, held, source))
 
 
 def with_named(meta: Mapping[str, Any], held: Sequence[Stall], found: Sequence[Flaw]) -> dict[str, Any]:
-    """Metadata that name these stalls and faults, and no others."""
+    """Metadata that name exactly these stalls and faults."""
     return {
         **{name: value for name, value in meta.items() if name not in (STALLS, record.KEY)},
         **({STALLS: as_meta(held)} if held else {}), **({record.KEY: record.as_meta(found)} if found else {}),
@@ -93,13 +78,7 @@ def with_named(meta: Mapping[str, Any], held: Sequence[Stall], found: Sequence[F
 def alive(
     demonstration: Demonstration, held: Sequence[Stall] | None = None, found: Sequence[Flaw] | None = None
 ) -> Mask:
-    """Mask (T,) of samples whose wrench is what the sensor measured.
-
-    Args:
-        demonstration: as read.
-        held: its stalls; looked for if not given.
-        found: its faults; looked for if not given.
-    """
+    """Mask (T,) of samples with a valid wrench."""
     time = demonstration.time
     held = stalls(demonstration) if held is None else held
     mask = np.ones(len(time), dtype=bool)
@@ -112,13 +91,7 @@ def alive(
 
 
 def pressing(demonstration: Demonstration, live: Mask, found: Sequence[Flaw]) -> Mask:
-    """Mask (T,) of samples that may be in contact: those alive, and those that saturate, whose force is larger.
-
-    Args:
-        demonstration: as read.
-        live: its samples that are alive.
-        found: its faults.
-    """
+    """Mask (T,) of samples that may be in contact: those alive, and those that saturate."""
     mask, time = live.copy(), demonstration.time
     for fault in (f for f in found if f.kind == SATURATED):
         mask |= (time >= fault.start) & (time <= fault.stop)
@@ -128,7 +101,7 @@ def pressing(demonstration: Demonstration, live: Mask, found: Sequence[Flaw]) ->
 
 
 def refuse_faults(demonstration: Demonstration) -> None:
-    """Refuse to learn from a demonstration of which a part is not what happened, with the line that keeps the rest.
+    """Refuse to learn from a demonstration with stalls or faults. The message gives the command that keeps the rest.
 
     Raises:
         InputError: with the first stall or fault, and the longest part without any.
@@ -141,11 +114,11 @@ def refuse_faults(demonstration: Demonstration) -> None:
     name = d.source or "demonstration"
     more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
     first, last = longest_part(d, found)
-    part = f" --from {np.ceil(1e3 * first - 1e-6) / 1e3:.3f}" if first > d.time[0] else ""
-    part += f" --to {np.floor(1e3 * last + 1e-6) / 1e3:.3f}" if last < d.time[-1] else ""
+    part = f" --set from={np.ceil(1e3 * first - 1e-6) / 1e3:.3f}" if first > d.time[0] else ""
+    part += f" --set to={np.floor(1e3 * last + 1e-6) / 1e3:.3f}" if last < d.time[-1] else ""
     raise InputError(
         name, f"{found[0].words()}{more}: {_consequence(found[0])}",
-        f"cut it off (skillframe demonstration convert {name}{part} --out cut.npz), or record it again",
+        f"cut it off (skillframe convert {name}{part} --out cut.npz), or record it again",
     )  # fmt: skip
 
 
@@ -159,20 +132,13 @@ def _consequence(found: Stall | Flaw) -> str:
 
 
 def longest_part(demonstration: Demonstration, found: Sequence[Stall | Flaw]) -> tuple[float, float]:
-    """Start and stop of the longest part without a stall or fault, one sample apart from each [s].
-
-    A jump parts two sound stretches.
-    """
+    """Start and stop of the longest part without stall or fault, one sample away from each [s]."""
     step, last = 1.0 / demonstration.rate, float(demonstration.time[-1])
     begin, parts = float(demonstration.time[0]), []
-    for stop, again in sorted(_gap(f, step) for f in found):
+    gaps = [
+        (f.start, f.stop) if isinstance(f, Flaw) and f.kind == JUMP else (f.start - step, f.stop + step) for f in found
+    ]  # a jump's own samples are valid
+    for stop, again in sorted(gaps):
         parts.append((begin, stop))
         begin = max(begin, again)
     return max([*parts, (begin, last)], key=lambda part: part[1] - part[0])
-
-
-def _gap(found: Stall | Flaw, step: float) -> tuple[float, float]:
-    """Where what is sound ends and begins again [s]."""
-    if isinstance(found, Flaw) and found.kind == JUMP:
-        return found.start, found.stop
-    return found.start - step, found.stop + step

@@ -1,1 +1,1 @@
-"""What ships of `skillframe.execution.drive.Drive`, and which one a run takes."""
+"""The core's drives, and the choice among them."""

@@ -1,30 +1,30 @@
-"""Several arms: each has its own sensors, filter, impedance law, limits and trace, and knows nothing of the others.
+"""Drive of several arms, each with its own sensors, filter, impedance controller, limits and trace.
 
-Between them stands the coordinator alone, which sees (N, arms, ...) and answers with a command for every arm. Inside
-there is a row per trial and arm (row = trial * arms + arm), so an arm is controlled exactly as it would be alone.
-The first arm holds the scene's tool, the second its fixture.
+Only the coordinator connects them. Batch row = trial * arms + arm, so each arm is controlled as it would be alone. The
+first arm holds the scene's tool, the second its fixture.
+
+Runs a skill for one arm on the first of several arms, while the others stand still.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.control.endings import Broken
 from skillframe.errors import SkillframeError
-from skillframe.execution.drive import Shares, Trials
-from skillframe.execution.drives.plants import encoders_of, varied_plants
-from skillframe.execution.drives.torque import Gauge, TorqueDrive
+from skillframe.execution.drive import Setup, Shares, Trials
+from skillframe.execution.drives.torque import Gauge, TorqueDrive, encoders_of, varied_plants
+from skillframe.execution.executor import simulate
 from skillframe.execution.recorder import Recorder
 from skillframe.execution.result import ArmsResult, Result
-from skillframe.execution.setup import Setup
 from skillframe.execution.trace import Trace
 from skillframe.frames import Float, Pose, norm, rotation_vector
-from skillframe.skill import Command, Impedance, Observation
+from skillframe.handover import ShapeCheck
+from skillframe.skill import Broken, Command, Impedance, Observation, Skill
 from skillframe.world.plant import Draws, Kinematics
 from skillframe.world.sensors import Sensors
 
@@ -32,16 +32,13 @@ __all__ = ["ArmsDrive", "SeveralArms"]
 
 
 class SeveralArms:
-    """The arms of N robots as rows of one limb: a `skillframe.execution.drives.torque.Limb`.
-
-    Args:
-        setup: robot, scene and settings; a centre of compliance for all arms, or one for each.
-        draws: quantities per trial.
-        rngs: one generator per trial, for the sensors.
+    """The arms of N robots as rows of one `skillframe.execution.drives.torque.Limb`.
 
     Attributes:
-        arms: their number; views: the plant as each arm sees it; points: (arms, 3) centres of compliance.
-        path: (N, arms, joints) way that each joint went.
+        arms: their number.
+        views: the plant as each arm sees it.
+        points: (arms, 3) centres of compliance.
+        path: (N, arms, joints) distance that each joint moved.
     """
 
     def __init__(self, setup: Setup, draws: Draws, rngs: Sequence[np.random.Generator]) -> None:
@@ -56,24 +53,24 @@ class SeveralArms:
             raise SkillframeError(f"robot {setup.robot.spec.name}: its arms differ in their number of joints")
         self.points = np.broadcast_to(np.asarray(setup.center_of_compliance, dtype=float), (self.arms, 3))
         self.point, self.rows = np.tile(self.points, (self.count, 1)), self.count * self.arms
-        self.dt = 1.0 / setup.robot.spec.control.rate_hz
+        self.dt = 1.0 / setup.robot.spec.control.tick_hz
         self.path = np.zeros((self.count, self.arms, len(self.views[0].dofs)))
         self.sensors: Gauge = _ArmSensors(self, setup, rngs, draws)
 
     def by_arm(self, parts: Sequence[Float]) -> Float:
-        """(N, arms, ...) out of one (N, ...) per arm, in C order, or rounding would depend on N."""
+        """Stack one (N, ...) per arm to (N, arms, ...), in C order, or rounding would depend on N."""
         result = np.empty((self.count, self.arms, *parts[0].shape[1:]))
         for arm, part in enumerate(parts):
             result[:, arm] = part
         return result
 
     def as_rows(self, parts: Sequence[Float]) -> Float:
-        """(N arms, ...) out of one (N, ...) per arm."""
+        """Stack one (N, ...) per arm to (N arms, ...)."""
         stacked = self.by_arm(parts)
         return stacked.reshape(self.rows, *stacked.shape[2:])
 
     def kinematics(self, active: Trials) -> Kinematics:
-        """Rows of the nominal robots where the plant's are now. Each with its own arm's joints."""
+        """Kinematics of the nominal robots at the plant's joints."""
         views = self.views
         if self.nominal is not self.plant:
             qpos, qvel = self.plant.state if self._encoders is None else self._encoders.state
@@ -88,17 +85,17 @@ class SeveralArms:
         )
 
     def mass_matrix(self) -> Float:
-        """(rows, joints, joints) of the nominal robots."""
+        """Mass matrices (rows, joints, joints) of the nominal robots."""
         whole = self.nominal.mass_matrix()
         return self.as_rows([whole[:, view.dofs][:, :, view.dofs] for view in self.views])
 
     def joint_positions(self) -> Float:
-        """(rows, joints)."""
+        """Joint positions (rows, joints)."""
         positions = self.plant.joint_positions
         return self.as_rows([positions[:, view.dofs] for view in self.views])
 
     def push(self, torque: Float, active: Trials) -> list[Broken]:
-        """Move the plant by a tick under joint torques (rows, joints). Nothing fails."""
+        """Step the plant under joint torques (rows, joints)."""
         whole = np.zeros((self.count, self.plant.model.nv))
         _, velocity = self.plant.state
         for arm, view in enumerate(self.views):
@@ -110,20 +107,17 @@ class SeveralArms:
         return []
 
     def turns(self) -> Float:
-        """(N, arms, 3, 3) attitudes of the tools, base axes."""
+        """Orientations of the tools (N, arms, 3, 3), base axes."""
         return self.by_arm([view.tool_pose().rotation for view in self.views])
 
 
 class ArmsDrive:
-    """Arms under an impedance law each. Observations, commands and wrenches are (N, arms, ...).
-
-    Args:
-        setup, draws, rngs: as of `SeveralArms`.
-    """
+    """Arms with an impedance controller each. Observations, commands and wrenches are (N, arms, ...)."""
 
     actuators: tuple[str, ...] = ()
 
     def __init__(self, setup: Setup, draws: Draws, rngs: Sequence[np.random.Generator]) -> None:
+        require_arms(setup)
         self.limb = SeveralArms(setup, draws, rngs)
         self.rows = TorqueDrive(setup, self.limb)
         self.plant, self.dt = self.limb.plant, self.rows.dt
@@ -134,11 +128,11 @@ class ArmsDrive:
         self._recording: _ArmRecording | None = None
 
     def prepare(self) -> list[Broken]:
-        """Both arms hold still and tare their sensors."""
+        """Hold still and tare all sensors."""
         return self.rows.prepare()
 
     def sense(self, tick: int, active: Trials) -> Observation:
-        """What the arms' sensors say, (N, arms, ...)."""
+        """Observation (N, arms, ...)."""
         seen = self.rows.sense(tick, active)
         return Observation(
             seen.time.reshape(self.shape), seen.dt,
@@ -147,7 +141,7 @@ class ArmsDrive:
         )  # fmt: skip
 
     def act(self, command: Command, ramp: float) -> Float:
-        """Each arm's command to its law. The laws' wrenches (N, arms, 6)."""
+        """Apply each arm's command, and return wrenches (N, arms, 6)."""
         law = self.rows.act(
             command._replace(
                 pose=Pose(command.pose.position.reshape(-1, 3), command.pose.rotation.reshape(-1, 3, 3)),
@@ -165,28 +159,28 @@ class ArmsDrive:
         return Impedance(rows(impedance.stiffness), None if impedance.damping is None else rows(impedance.damping))
 
     def violations(self, tick: int, active: Trials) -> list[Broken]:
-        """Trials of which an arm broke a limit, with the arm's name."""
+        """Trials in which an arm broke a limit, with the arm's name."""
         arms = self.limb.arms
         found = self.rows.violations(tick, (active[:, None] * arms + np.arange(arms)).ravel())
         return [Broken(row // arms, code, f"arm {self.names[row % arms]!r}: {why}") for row, code, why in found]
 
     def advance(self, active: Trials) -> list[Broken]:
-        """The plant moves under the arms' torques."""
+        """Step the plant."""
         return self.rows.advance(active)
 
     def end(self, rows: Trials) -> None:
-        """Keep how far each tool has turned."""
+        """Store the rotation of each tool."""
         now = self.limb.turns()
         self.turned[rows] = rotation_vector(now @ np.swapaxes(self.start_rotation, -1, -2))[rows]
 
     def contact_torque(self) -> Float:
-        """(N,) largest of the arms' [Nm]."""
+        """Largest contact torque of the arms (N,) [Nm]."""
         parts = zip(self.limb.views, self.limb.points, strict=True)
         largest: Float = np.max([norm(view.contact_wrench(point)[:, 3:]) for view, point in parts], axis=0)
         return largest
 
     def shares(self) -> Shares:
-        """Energy of all arms, shares of the worst joint of any arm."""
+        """Energy of all arms, and shares of the worst joint of any arm."""
         found = self.rows.shares()
         assert found.range is not None
         assert found.joints is not None
@@ -198,18 +192,18 @@ class ArmsDrive:
         return Shares(found.energy.reshape(self.shape).sum(-1), torque, speed, place, joints)
 
     def notes(self, i: int) -> list[str]:
-        """Whose motors count as unlimited."""
+        """Motors without limits."""
         return self.rows.notes(i)
 
     def recording(self, every: int) -> _ArmRecording:
-        """A recorder per arm."""
+        """One recorder per arm."""
         parts = zip(self.limb.views, self.limb.points, strict=True)
         recorders = [Recorder(view, every, point) for view, point in parts]
         self._recording = _ArmRecording(recorders, self.names, self.limb.points)
         return self._recording
 
     def outcome(self, result: Result) -> ArmsResult:
-        """With what each arm did."""
+        """The result with the arms' own values."""
         plain = {f.name: getattr(result, f.name) for f in fields(Result)}
         traces = None if self._recording is None else self._recording.by_arm
         return ArmsResult(
@@ -218,7 +212,7 @@ class ArmsDrive:
 
 
 class _ArmSensors:
-    """One set of sensors per arm, read as rows. Each arm draws from a generator of its own."""
+    """One set of sensors per arm, each with its own random generator."""
 
     def __init__(self, limb: SeveralArms, setup: Setup, rngs: Sequence[np.random.Generator], draws: Draws) -> None:
         self._limb, self._arms = limb, limb.arms
@@ -229,7 +223,6 @@ class _ArmSensors:
         ]
 
     def sample(self, pose: Pose) -> tuple[Pose, Float]:
-        """As `Sensors.sample`, for rows."""
         read = [
             sensors.sample(Pose(pose.position[arm :: self._arms], pose.rotation[arm :: self._arms]))
             for arm, sensors in enumerate(self._sensors)
@@ -239,24 +232,18 @@ class _ArmSensors:
         return measured, rows([wrench for _, wrench in read])
 
     def set_tare(self, mean: Float, rotation: Float) -> None:
-        """As `Sensors.set_tare`, for rows."""
         for arm, sensors in enumerate(self._sensors):
             sensors.set_tare(mean[arm :: self._arms], rotation[arm :: self._arms])
 
 
 class _ArmRecording:
-    """One recorder per arm.
-
-    Attributes:
-        by_arm: the traces of the trials asked for so far, by the arm's name.
-    """
+    """One recorder per arm. `by_arm` has the requested traces by the arm's name."""
 
     def __init__(self, recorders: Sequence[Recorder], names: Sequence[str], points: Float) -> None:
         self._recorders, self._names, self._points = recorders, names, points
         self.by_arm: list[dict[str, Trace]] = []
 
     def record(self, tick: int, time: float, observation: Observation, command: Command, law: Float) -> None:
-        """As `Recorder.record`, for (N, arms, ...)."""
         for arm, recorder in enumerate(self._recorders):
             seen = Observation(
                 observation.time[:, arm], observation.dt,
@@ -267,15 +254,105 @@ class _ArmRecording:
             recorder.record(tick, time, seen, command._replace(pose=pose), law[:, arm])
 
     def close(self, rows: Trials) -> None:
-        """As `Recorder.close`, for trials."""
         for recorder in self._recorders:
             recorder.close(rows)
 
     def trace(self, i: int, meta: dict[str, Any]) -> Trace:
-        """The first arm's trace of trial i. Those of all arms are kept in `by_arm`, trial by trial."""
+        """Return the first arm's trace of trial i, and add those of all arms to `by_arm`."""
         parts = zip(self._names, self._recorders, self._points, strict=True)
         self.by_arm.append({
             name: recorder.trace(i, {**meta, "arm": name, "center_of_compliance": point.tolist()})
             for name, recorder, point in parts
         })  # fmt: skip
         return self.by_arm[-1][self._names[0]]
+
+
+def adapted(skill: Skill, setup: Setup) -> Skill:
+    """A coordinator, which for a skill of one arm is a `FirstArm`."""
+    return FirstArm(skill) if np.ndim(setup.center_of_compliance) == 1 else skill
+
+
+def require_arms(setup: Setup) -> None:
+    """Check that there are two arms.
+
+    Raises:
+        SkillframeError: the robot has one arm, or the scene no fixture to hold.
+    """
+    if len(setup.robot.tool_frames) < 2 or setup.scene.holder is None:
+        raise SkillframeError(
+            f"robot {setup.robot.spec.name} in world {setup.scene.name}: a coordinator needs a robot with two arms and "
+            "a world whose fixture can be held; take dual_panda and dual_peg"
+        )
+
+
+STILL = Impedance(np.diag([2000.0] * 3 + [100.0] * 3), np.diag([180.0] * 3 + [8.0] * 3))
+"""Impedance of an arm without a task: stiff, and about critically damped."""
+
+
+class FirstArm(Skill):
+    """A coordinator that runs a skill on the first arm while the others hold their poses."""
+
+    def __init__(self, skill: Skill) -> None:
+        self._skill = skill
+
+    def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
+        """Store the tools' poses, and start the skill."""
+        self._home = Pose(observation.pose.position.copy(), observation.pose.rotation.copy())
+        count, arms = observation.time.shape
+        self._rest = np.zeros((count, arms, 6))
+        self._gains = [np.array(np.broadcast_to(gain, (count, arms, 6, 6))) for gain in STILL if gain is not None]
+        self._checked = ShapeCheck(self._skill, (count,))
+        self._skill.start(_first(observation), rngs)
+
+    def step(self, observation: Observation) -> Command:
+        """The skill's command for the first arm, and the start pose for the others."""
+        wanted = self._checked(self._skill.step(_first(observation)))
+        stiffness, damping = self._gains
+        stiffness[:, 0] = wanted.impedance.stiffness
+        if wanted.impedance.damping is not None:
+            damping[:, 0] = wanted.impedance.damping
+        position = _replaced(self._home.position, wanted.pose.position)
+        return Command(
+            Pose(position, _replaced(self._home.rotation, wanted.pose.rotation)),
+            _replaced(self._rest, wanted.twist),
+            Impedance(stiffness, None if wanted.impedance.damping is None else damping),
+            _replaced(self._rest, wanted.feedforward),
+            wanted.status,
+            wanted.reason,
+        )
+
+
+def _first(observation: Observation) -> Observation:
+    pose = Pose(observation.pose.position[:, 0], observation.pose.rotation[:, 0])
+    return Observation(observation.time[:, 0], observation.dt, pose, observation.twist[:, 0], observation.wrench[:, 0])
+
+
+def _replaced(arms: Float, first: Float) -> Float:
+    result = arms.copy()
+    result[:, 0] = first
+    return result
+
+
+def simulate_arms(
+    coordinator: Skill,
+    setup: Setup,
+    draws: Mapping[str, Float],
+    rngs: Sequence[np.random.Generator],
+    *,
+    duration_s: float = 30.0,
+    trace_hz: float | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> ArmsResult:
+    """Run a coordinator on len(rngs) trials until each has ended. Arguments as of `executor.simulate`.
+
+    With one centre of compliance (3,), `coordinator` is a skill for the first arm, and the others hold still. `start.*`
+    displaces the first arm's tool, `fixture.*` the fixture in the second hand.
+
+    Raises:
+        SkillframeError: the robot has one arm, or the scene no fixture to hold.
+        UnknownName, UnreachablePose: as `simulate`.
+    """
+    require_arms(setup)
+    result = simulate(coordinator, setup, draws, rngs, duration_s=duration_s, trace_hz=trace_hz, progress=progress)
+    assert isinstance(result, ArmsResult)
+    return result

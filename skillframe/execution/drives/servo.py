@@ -1,10 +1,9 @@
-"""Electric servos: joints driven by FMUs that take a torque or a position, co-simulated between law and plant.
+"""Electric servos: joints driven by co-simulated FMUs with a torque or position input.
 
     impedance -> joint torque -> motors' limits -> torque or target -> FMU -> spring torque -> plant
 
-The law is that of ideal torques (`skillframe.execution.drives.torque`). It reads joint positions at the joints and,
-where the FMUs give it, velocities at the motors: damping that acts before the spring is stable where damping behind it
-is not. Joints without an FMU are driven ideally.
+The controller is that of `skillframe.execution.drives.torque`, with motor velocities where the FMUs provide them:
+damping on the joint's side of the spring is unstable. Joints without an FMU have ideal torques.
 """
 
 from __future__ import annotations
@@ -14,35 +13,27 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.control.endings import Broken
 from skillframe.cosim.servos import Servos, actuator_specs, open_servos, servos, start_parameters
-from skillframe.execution.drive import Shares, Trials
+from skillframe.execution.drive import Setup, Shares, Trials
 from skillframe.execution.drives.actuated import Actuated
-from skillframe.execution.drives.recording import WithColumns
 from skillframe.execution.drives.torque import Gauge, OneArm, TorqueDrive
-from skillframe.execution.recorder import Recorder
+from skillframe.execution.recorder import Recorder, WithColumns
 from skillframe.execution.result import Result
-from skillframe.execution.setup import Setup
-from skillframe.fmu.unmapped import unmapped
+from skillframe.fmu.opening import unmapped
 from skillframe.frames import Float
-from skillframe.signals.delay import CommandDelay
-from skillframe.skill import Command, Observation
+from skillframe.signals import CommandDelay
+from skillframe.skill import Broken, Command, Observation
 from skillframe.world.plant import Draws, Kinematics
 
 NOT_RECORDED = ("force_mean", "work")
 
 
 class ServoLimb:
-    """An arm whose joints are driven by FMUs: a `skillframe.execution.drives.torque.Limb`.
-
-    Args:
-        setup: robot, scene and settings.
-        draws: quantities per trial.
-        rngs: one generator per trial, for the sensors.
+    """An arm with joints driven by FMUs: a `skillframe.execution.drives.torque.Limb`.
 
     Raises:
-        InputError: a servo cannot be driven as robot.toml says.
-        StepTooLarge: the control rate is too low for a spring and what it carries.
+        InputError: a servo does not fit robot.toml.
+        StepTooLarge: the control rate is too low for a spring and its load.
     """
 
     dofs: Sequence[NDArray[np.int64]] | None = None
@@ -51,7 +42,7 @@ class ServoLimb:
         spec = setup.robot.spec
         self.servos: Servos = servos(spec)
         self.arm = OneArm(setup, draws, rngs)
-        self.plant, self.rows, self.point = self.arm.plant, self.arm.rows, self.arm.point
+        self.plant, self.rows, self.point, self.dt = self.arm.plant, self.arm.rows, self.arm.point, self.arm.dt
         self.sensors: Gauge = self.arm.sensors
         self.joints = tuple(actuation.joint for actuation in spec.actuation)
         self.bank = open_servos(spec, self.rows)
@@ -74,7 +65,7 @@ class ServoLimb:
         self._velocity: Float = self.actuated.plant.velocity
 
     def kinematics(self, active: Trials) -> Kinematics:
-        """Of the nominal robots where the plant's joints are now, with the velocities of the motors."""
+        """Kinematics of the nominal robots at the plant's joints, with the motors' velocities."""
         seen = self.arm.kinematics(active)
         velocity = seen.velocity.copy()
         joints = velocity.take(self.driven, axis=1)
@@ -85,17 +76,17 @@ class ServoLimb:
         return seen._replace(velocity=velocity)
 
     def mass_matrix(self) -> Float:
-        """(N, nv, nv) of the nominal robots, with the rotors."""
+        """Mass matrices (N, nv, nv) of the nominal robots, including rotors."""
         matrix = self.arm.mass_matrix()
         matrix[:, self.driven, self.driven] += self.servos.inertia
         return matrix
 
     def joint_positions(self) -> Float:
-        """(N, nv)."""
+        """Joint positions (N, nv)."""
         return self.arm.joint_positions()
 
     def push(self, torque: Float, active: Trials) -> list[Broken]:
-        """A tick under generalised forces (N, nv): what FMUs drive through them, the rest ideally."""
+        """Step under generalised forces (N, nv), through FMUs where there are some."""
         coupled = self.actuated.plant
         coupled.load[:] = torque
         coupled.load[:, self.driven] = 0.0
@@ -108,11 +99,7 @@ class ServoLimb:
 
 
 class ServoDrive:
-    """One arm under an impedance law, its joints driven by servos as FMUs.
-
-    Args:
-        setup, draws, rngs: as of `ServoLimb`.
-    """
+    """One arm with an impedance controller and servos as FMUs."""
 
     def __init__(self, setup: Setup, draws: Draws, rngs: Sequence[np.random.Generator]) -> None:
         spec = setup.robot.spec
@@ -123,44 +110,44 @@ class ServoDrive:
         self._unmapped = [text for row in rows for text in row._replace(outputs=()).sentences]
 
     def prepare(self) -> list[Broken]:
-        """Hold still and tare. Trials whose FMU refuses to start do not run."""
+        """Hold still and tare. Trials whose FMU failed to start do not run."""
         failed = self.limb.actuated.failed(np.arange(self.plant.count))
         return [*failed, *self.law.prepare()]
 
     def sense(self, tick: int, active: Trials) -> Observation:
-        """As with ideal torques, the twist from the motors' velocities."""
+        """Observation, with the twist from the motors' velocities."""
         return self.law.sense(tick, active)
 
     def act(self, command: Command, ramp: float) -> Float:
-        """The law's torques, held to the motors' limits."""
+        """Compute torques within the motors' limits."""
         return self.law.act(command, ramp)
 
     def violations(self, tick: int, active: Trials) -> list[Broken]:
-        """The robot's limits, and the energy that the coupling makes."""
+        """The robot's limits, and the energy error of the coupling."""
         return [*self.law.violations(tick, active), *self.limb.actuated.violations(tick, active)]
 
     def advance(self, active: Trials) -> list[Broken]:
-        """One coupled step. Trials whose FMU failed, each with its sentence."""
+        """Step the coupled plant."""
         return self.law.advance(active)
 
     def end(self, rows: Trials) -> None:
-        """Their FMUs are not stepped any more."""
+        """Stop stepping their FMUs."""
         self.limb.actuated.end(rows)
 
     def contact_torque(self) -> Float:
-        """(N,) [Nm]."""
+        """Contact torque (N,) [Nm]."""
         return self.law.contact_torque()
 
     def shares(self) -> Shares:
-        """Of the URDF's effort and velocity."""
+        """Shares of the URDF's effort and velocity."""
         return self.law.shares()
 
     def notes(self, i: int) -> list[str]:
-        """Whose motors count as unlimited, what stands in for FMUs, and inputs of theirs that nobody writes."""
+        """Motors without limits, substitutes for FMUs, and their unused inputs."""
         return [*self.law.notes(i), *self.limb.bank.notes, *self._unmapped]
 
     def recording(self, every: int) -> WithColumns:
-        """A recorder with what the servos were told and every output that is mapped and there."""
+        """A recorder with the servos' commands and all available outputs."""
         k, names, y = len(self.actuators), self.limb.bank.outputs, self.limb.bank.y
         there = np.asarray(np.isfinite(y.reshape(-1, k, len(names))).all(axis=1).any(axis=0))
         given = [name for name, is_there in zip(names, there, strict=True) if is_there and name not in NOT_RECORDED]
@@ -169,7 +156,7 @@ class ServoDrive:
         return WithColumns(Recorder(self.plant, every, self.limb.point, machine=columns), self._columns)
 
     def outcome(self, result: Result) -> Result:
-        """As it is."""
+        """The unchanged result."""
         return result
 
     def _columns(self) -> dict[str, Float]:

@@ -1,9 +1,11 @@
-"""Ideal joint torques: sensors, filter, impedance law, motors and limits of arms, and a plant that takes their torques.
+"""Drive with ideal joint torques: sensors, filter, impedance controller, motors and limits.
 
     encoders, force sensor -> filter -> Observation -> skill -> Command -> impedance -> motors -> torque -> plant
 
-The law knows the nominal robot only: where masses or the grasp differ from trial to trial, its kinematics and dynamics
-come from a second, nominal batch. What it steers is a `Limb`: one arm, or the rows of several.
+The controller knows only the nominal robot: where masses or grasp vary, a second, nominal batch provides kinematics and
+dynamics. It controls a `Limb`: one arm, or the rows of several.
+
+The true plant of a batch, and the nominal one of the controller.
 """
 
 from __future__ import annotations
@@ -15,47 +17,44 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.control.controller import ImpedanceController, Reading
-from skillframe.control.endings import Broken
-from skillframe.control.joint_friction import FrictionCompensation
 from skillframe.control.limits import LimitGuard
-from skillframe.control.motors import Motors, joint_limits, unstated
+from skillframe.control.motors import FrictionCompensation, Motors, joint_limits, unstated
 from skillframe.control.ticks import compiled_filter
-from skillframe.execution.drive import Shares, Trials
-from skillframe.execution.drives.plants import encoders_of, varied_plants
+from skillframe.execution.drive import Setup, Shares, Trials
 from skillframe.execution.recorder import Recorder
 from skillframe.execution.result import Result
-from skillframe.execution.setup import Setup
 from skillframe.frames import Float, Pose, move_wrench, norm, rotate
-from skillframe.signals.delay import CommandDelay
-from skillframe.signals.kalman import WrenchFilter
-from skillframe.skill import Command, Impedance, Observation, no_reasons
+from skillframe.signals import CommandDelay, WrenchFilter
+from skillframe.skill import Broken, Command, Ended, Impedance, Observation, no_reasons
+from skillframe.world.placement import fixture_poses, start_configurations
 from skillframe.world.plant import Draws, Kinematics, Plant
-from skillframe.world.sensors import TARE_TICKS, Sensors
+from skillframe.world.sensors import TARE_TICKS, JointEncoders, Sensors
 
 HOLD = Impedance(np.diag([2000.0] * 3 + [100.0] * 3))
 TARED_IN_CONTACT = 0.5
-"""[N] of true contact, the mean while the sensor is tared, from which a trial says so.
+"""Mean true contact force [N] during taring that is reported: the admittance controller's contact threshold.
 
-It is what the admittance law takes for no contact. A sensor alone cannot tell contact from its bias, and the simulator
-knows the contact (our choice)."""
+A sensor alone cannot separate contact from bias.
+"""
 
 
 class Gauge(Protocol):
-    """Pose and force-torque sensor of a limb, as `skillframe.world.sensors.Sensors`."""
+    """Pose and force-torque sensor of a limb."""
 
     def sample(self, pose: Pose) -> tuple[Pose, Float]:
-        """Measured pose, and the wrench (rows, 6) without weight and tare."""
+        """Measured pose, and the wrench (rows, 6) without weight and bias."""
 
     def set_tare(self, mean: Float, rotation: Float) -> None:
-        """Take the mean wrench (rows, 6) of a still moment as the bias."""
+        """Set the mean wrench (rows, 6) at rest as the bias."""
 
 
 class Limb(Protocol):
-    """What a torque law senses and moves.
+    """What a torque controller senses and moves.
 
     Attributes:
         plant: the simulated robots.
-        rows: number of rows: a trial's, or a trial's and arm's.
+        rows: one per trial, or per trial and arm.
+        dt: [s] between two readings.
         point: centre of compliance in the tool frame, (3,) or (rows, 3).
         sensors: of the tool.
         dofs: generalised velocities of each arm's rows; None where a row has them all.
@@ -63,36 +62,32 @@ class Limb(Protocol):
 
     plant: Plant
     rows: int
+    dt: float
     point: Float
     sensors: Gauge
     dofs: Sequence[NDArray[np.int64]] | None
 
     def kinematics(self, active: Trials) -> Kinematics:
-        """Of the nominal robots where the plant's are now."""
+        """Kinematics of the nominal robots."""
 
     def mass_matrix(self) -> Float:
-        """(rows, nv, nv) of the nominal robots."""
+        """Mass matrices (rows, nv, nv) of the nominal robots."""
 
     def joint_positions(self) -> Float:
-        """(rows, nv)."""
+        """Joint positions (rows, nv)."""
 
     def push(self, torque: Float, active: Trials) -> list[Broken]:
-        """Move the plant by a tick under joint torques (rows, nv). Trials whose actuators failed."""
+        """Step the plant under joint torques (rows, nv). Returns trials whose actuators failed."""
 
 
 class TorqueDrive:
-    """A limb under an impedance law. Its observations, commands and wrenches have the limb's rows.
-
-    Args:
-        setup: robot, scene and settings.
-        limb: what is steered.
-    """
+    """A limb with an impedance controller."""
 
     actuators: tuple[str, ...] = ()
 
     def __init__(self, setup: Setup, limb: Limb) -> None:
         self.limb, self.plant, self.rows = limb, limb.plant, limb.rows
-        self.dt = 1.0 / setup.robot.spec.control.tick_hz
+        self.dt = limb.dt
         self.filter = WrenchFilter(dt=self.dt).steady() if setup.filter_wrench else None
         self._compiled = compiled_filter(self.rows, self.filter)
         self.controller = ImpedanceController(self.rows)
@@ -106,13 +101,15 @@ class TorqueDrive:
         self._unstated = unstated(setup.robot) if limits else []
         self.guard = LimitGuard(setup.limits, self.rows, self.dt, self.motors)
         self.contact_at_tare = np.zeros(self.plant.count)
-        """(N,) mean force that something put on the tool while its sensor was tared [N]: so far off all forces are."""
+        """Mean contact force on the tool during taring (N,) [N], an error of all later forces."""
 
     def prepare(self) -> list[Broken]:
-        """Hold still, let the readings settle, and take their mean as the sensor's bias."""
+        """Hold still until the readings settle, and take their mean as the sensor's bias."""
         active = np.arange(self.plant.count)
         kinematics = self.limb.kinematics(active)
-        self._start_late(kinematics.bias)
+        if self._late:
+            self._delay = CommandDelay(np.full(self.rows, self._late), kinematics.bias.shape[-1])
+            self._delay.start(kinematics.bias)
         hold = Pose(kinematics.pose.position.copy(), kinematics.pose.rotation.copy()).at(self.limb.point)
         still = np.zeros((self.rows, 6))
         command = Command(hold, still, HOLD, still, np.zeros(self.rows, dtype=np.int64), no_reasons(self.rows))
@@ -131,24 +128,27 @@ class TorqueDrive:
         self.limb.sensors.set_tare(total / TARE_TICKS, self.limb.kinematics(active).pose.rotation)
         return broken
 
-    def _start_late(self, holding: Float) -> None:
-        """Torques that are under way at the start are those (rows, nv) that hold the robots still."""
-        if self._late:
-            self._delay = CommandDelay(np.full(self.rows, self._late), holding.shape[-1])
-            self._delay.start(holding)
-
     def sense(self, tick: int, active: Trials) -> Observation:
         """Pose and twist of the centre of compliance, and the filtered wrench there."""
         kinematics = self.limb.kinematics(active)
         tool, raw = self.limb.sensors.sample(kinematics.pose)
         self._position, lever = tool.position, rotate(tool.rotation, self.limb.point)
-        self._wrench = self._filtered(raw, tick, lever)
+        if self.filter is None:
+            self._wrench = move_wrench(raw, lever)
+        else:
+            filter_ = self._compiled or self.filter
+            if tick == 0:
+                filter_.start(raw * 0.0)
+            if self._compiled is not None:
+                self._wrench = self._compiled.step(raw, lever)
+            else:
+                self._wrench = move_wrench(self.filter.step(raw), lever)
         self._reading = self._read(kinematics, Pose(tool.position + lever, tool.rotation))
         time = np.full(self.rows, tick * self.dt)
         return Observation(time, self.dt, self._reading.pose, self._reading.twist, self._wrench)
 
     def act(self, command: Command, ramp: float) -> Float:
-        """Joint torques that the motors give, and the law's wrench (rows, 6), returned."""
+        """Compute the motors' torques, and return the controller's wrench (rows, 6)."""
         self._torque, self._law = self.controller.torque(command, self._reading, ramp)
         if self._friction is not None:
             self._torque = self._torque + self._friction.torque(self._reading.velocity)
@@ -159,22 +159,22 @@ class TorqueDrive:
         return self._law
 
     def violations(self, tick: int, active: Trials) -> list[Broken]:
-        """Rows among `active` that broke one of the robot's limits."""
+        """Rows among `active` that broke a limit."""
         return self.guard.violations(self._position, self._reading.twist, self._wrench, self._law, active)
 
     def advance(self, active: Trials) -> list[Broken]:
-        """The plant moves under the torques. Ideal motors do not fail."""
+        """Step the plant."""
         return self.limb.push(self._torque, active)
 
     def end(self, rows: Trials) -> None:
-        """Nothing is kept of how a trial ends."""
+        """Do nothing."""
 
     def contact_torque(self) -> Float:
-        """(N,) [Nm]."""
+        """Contact torque (N,) [Nm]."""
         return norm(self.plant.contact_wrench(self.limb.point)[:, 3:])
 
     def shares(self) -> Shares:
-        """(rows,) each."""
+        """Actuator use (rows,)."""
         if self.motors is None:
             unknown = np.full(self.rows, np.nan)
             return Shares(self.guard.energy, unknown, unknown, unknown)
@@ -182,7 +182,7 @@ class TorqueDrive:
         return Shares(self.guard.energy, torque, speed, place, joints)
 
     def notes(self, i: int) -> list[str]:
-        """Whose motors and ranges count as unlimited, and a sensor that was tared in contact."""
+        """Unlimited motors, and taring in contact."""
         force = self.contact_at_tare[i]
         if not force >= TARED_IN_CONTACT:
             return list(self._unstated)
@@ -194,21 +194,11 @@ class TorqueDrive:
         return Recorder(self.plant, every, self.limb.point)
 
     def outcome(self, result: Result) -> Result:
-        """As it is, the failures of trials that were tared in contact with that beside them."""
-        for i in np.flatnonzero((self.contact_at_tare >= TARED_IN_CONTACT) & ~result.success):
+        """The result, with taring in contact added to failures."""
+        started = result.ended_by != Ended.START.value
+        for i in np.flatnonzero((self.contact_at_tare >= TARED_IN_CONTACT) & ~result.success & started):
             result.failure[i] = f"{result.failure[i]}, after a tare in contact"
         return result
-
-    def _filtered(self, raw: Float, tick: int, lever: Float) -> Float:
-        """Wrench (rows, 6) at the centre of compliance, which lies `lever` (rows, 3) from the tool frame."""
-        if self.filter is None:
-            return move_wrench(raw, lever)
-        filter_ = self._compiled or self.filter
-        if tick == 0:
-            filter_.start(raw * 0.0)
-        if self._compiled is not None:
-            return self._compiled.step(raw, lever)
-        return move_wrench(self.filter.step(raw), lever)
 
     def _read(self, kinematics: Kinematics, measured: Pose) -> Reading:
         twist = (kinematics.jacobian @ kinematics.velocity[..., None])[..., 0]
@@ -217,18 +207,12 @@ class TorqueDrive:
 
 
 class OneArm:
-    """A robot's own arm, or a free-flying tool, whose joints take any torque at once: a `Limb`.
-
-    Args:
-        setup: robot, scene and settings.
-        draws: quantities per trial.
-        rngs: one generator per trial, for the sensors.
-    """
+    """A robot's own arm, or a free-flying tool, with ideal torques: a `Limb`."""
 
     dofs: Sequence[NDArray[np.int64]] | None = None
 
     def __init__(self, setup: Setup, draws: Draws, rngs: Sequence[np.random.Generator]) -> None:
-        self.rows = len(rngs)
+        self.rows, self.dt = len(rngs), 1.0 / setup.robot.spec.control.tick_hz
         self.plant, self.nominal = varied_plants(setup, draws, self.rows)
         self._encoders = encoders_of(setup, self.plant)
         self.point = np.asarray(setup.center_of_compliance, dtype=float)
@@ -236,27 +220,55 @@ class OneArm:
         self.sensors: Gauge = Sensors(setup.sensors, self.plant, rngs, draws)
 
     def kinematics(self, active: Trials) -> Kinematics:
-        """Of the nominal robots where the encoders say that the plant's are now."""
+        """Kinematics of the nominal robots at the measured joints."""
         if self.nominal is not self.plant:
             qpos, qvel = self.plant.state if self._encoders is None else self._encoders.state
             self.nominal.set_state(*self.nominal.without_mount(qpos, qvel), active)
         return self.nominal.kinematics(self.point)
 
     def read_encoders(self) -> None:
-        """A tick of the plant is over."""
+        """Sample the encoders after a tick."""
         if self._encoders is not None:
             self._encoders.sample(*self.plant.state)
 
     def mass_matrix(self) -> Float:
-        """(N, nv, nv) of the nominal robots."""
+        """Mass matrices (N, nv, nv) of the nominal robots."""
         return self.nominal.mass_matrix()
 
     def joint_positions(self) -> Float:
-        """(N, nv)."""
+        """Joint positions (N, nv)."""
         return self.plant.joint_positions if self._stiff else self.plant.positions_without_mount()
 
     def push(self, torque: Float, active: Trials) -> list[Broken]:
-        """Move the plant by a tick under generalised forces (N, nv). Nothing fails."""
+        """Step the plant under generalised forces (N, nv)."""
         self.plant.step(torque, active)
         self.read_encoders()
         return []
+
+
+def make(setup: Setup, draws: Draws, rngs: Sequence[np.random.Generator]) -> TorqueDrive:
+    """The drive of one arm."""
+    return TorqueDrive(setup, OneArm(setup, draws, rngs))
+
+
+def varied_plants(setup: Setup, draws: Draws, count: int) -> tuple[Plant, Plant]:
+    """The plant at its starts, and the nominal one: the same object if the robots are nominal.
+
+    Raises:
+        UnreachablePose: the robot cannot reach a start.
+    """
+    robot, scene, dt = setup.robot, setup.scene, 1.0 / setup.robot.spec.control.tick_hz
+    fixture = fixture_poses(robot, draws, count)
+    plant = Plant(robot, scene, count, fixture, draws, timestep=dt)
+    differs = any(key.startswith("grasp.") or key in ("robot.mass_scale", "robot.payload") for key in draws)
+    differs = differs or robot.spec.encoders is not None  # measured and true states differ
+    differs = differs or robot.spec.mount is not None
+    nominal = Plant(robot, scene, count, fixture, {}, timestep=dt, rigid=True) if differs else plant
+    plant.reset(start_configurations(robot, scene, draws, count))
+    return plant, nominal
+
+
+def encoders_of(setup: Setup, plant: Plant) -> JointEncoders | None:
+    """The encoders of a plant at its starts, or None where the state is known exactly."""
+    declared, dt = setup.robot.spec.encoders, 1.0 / setup.robot.spec.control.tick_hz
+    return None if declared is None else JointEncoders(declared, plant.model, plant.state[0], dt)

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from skillframe.fmu.channel import HEAD, Channel, Garbled
+from skillframe.fmu.child import HEAD, Channel, Garbled
 
 TOKEN = 2**63 + 5
 

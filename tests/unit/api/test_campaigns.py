@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from skillframe import Campaign, CampaignResults, learn, record, report, run
+from skillframe import Campaign, CampaignResults, learn, report, run
 from skillframe.errors import InputError
 from skillframe.robot.spec import load_robot
 
@@ -17,16 +17,6 @@ pytestmark = pytest.mark.needs_plugins
 VALLEY = ("valley", "free_tool")
 SHORT = {"duration_s": 0.1}
 VARY = {"start.offset_x": {"uniform": [-0.01, 0.01]}}
-
-
-@pytest.fixture(scope="module")
-def demonstrations():
-    return record(*VALLEY, count=2, seed=1)
-
-
-@pytest.fixture(scope="module")
-def skill(demonstrations):
-    return learn(demonstrations)
 
 
 @pytest.fixture(scope="module")
@@ -89,6 +79,7 @@ def test_keywords_replace_keys_of_the_file(skill, tmp_path):
     assert Campaign(tmp_path / "plan.toml", trials=2).spec.labels == ("slide.skill.json",)
 
 
+@pytest.mark.slow
 def test_a_temporary_folder_goes_with_the_results(skill):
     results = Campaign(world="free", skills=skill, robot="free_tool", trials=1, duration_s=0.1).run()
     folder = results.folder

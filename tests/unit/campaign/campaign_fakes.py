@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 
-from skillframe.campaign.chunk_progress import report_progress
 from skillframe.campaign.folder import prepare
+from skillframe.campaign.jobs import report_progress
 from skillframe.campaign.rows import EXTRA, OUTCOME, TRACE, rows_of
 from skillframe.campaign.runner import Options, run_campaign
 from skillframe.campaign.sampling import draws, trial_rngs

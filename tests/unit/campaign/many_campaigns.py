@@ -13,9 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.stats import norm
 
-from skillframe.campaign import statistics, stopping, summary
-from skillframe.campaign.axes import Axis
-from skillframe.campaign.sampling import draws, trial_rngs
+from skillframe.campaign import race, statistics, summary
+from skillframe.campaign.sampling import Axis, draws, trial_rngs
 from skillframe.campaign.spec import CampaignSpec, Stop
 
 TRIALS, WIDTH = 120, 0.35
@@ -24,7 +23,7 @@ LIMIT, WIDER = 0.7, 0.9
 QUICK_S, LONG_S = 1.0, 5.0  # a success ends early, a failure runs into the time limit
 for name in ("clopper_pearson", "confidence_sequence", "mcnemar", "mcnemar_sequential"):
     setattr(statistics, name, cache(getattr(statistics, name)))  # the same few counts over thousands of campaigns
-stopping.confidence_sequence = statistics.confidence_sequence
+race.confidence_sequence = statistics.confidence_sequence
 
 
 def uniform():
@@ -151,7 +150,7 @@ def seen(kind, seed, way, **law):
     elif way == "cluster":  # a worker per trial, and Ctrl-C before the first failure has run into its time limit
         everything = finished(made, 2 * made.spec.trials, 1, lambda last: rng.uniform(QUICK_S, 0.99 * LONG_S))
     rows = rows_of(made, everything)
-    rule = stopping.StopRule(spec)
+    rule = race.StopRule(spec)
     rule.add(rows[i] for i in rng.permutation(len(rows)))
     if rule.after is not None:
         rows = [row for row in rows if row["trial"] <= rule.after]

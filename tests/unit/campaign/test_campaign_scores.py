@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 import pytest
+from skillframe_testkit.checks.examples import example_demonstrations
 
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.cli.main import run
-from skillframe.conformance.examples import example_demonstrations
 from skillframe.errors import InputError, UnknownName
 from skillframe.execution.trace import Trace
 from skillframe.extend.reading import write_demonstration
@@ -19,7 +19,7 @@ import numpy as np
 from skillframe import hookimpl
 from skillframe.extend.records import ScoreType, SkillType
 from skillframe.skill import Command
-from skillframe.testing import HoldSkill
+from skillframe_testkit.suites import HoldSkill
 
 def way(trace):
     return np.linalg.norm(np.diff(trace.position, axis=0), axis=1).sum()
@@ -166,7 +166,7 @@ def test_a_run_tells_its_scores_as_json_in_words_and_in_its_trace(campaign, tmp_
 
 
 def test_a_score_is_no_quantity_that_varied_where_campaign_toml_is_missing(campaign):
-    from skillframe.reports.results import read_results
+    from skillframe_reports.results import read_results
 
     assert read_results(campaign(["way", "last"]) / "results.csv").varied == ("start.offset_x",)
 
@@ -180,18 +180,20 @@ def test_a_score_that_fails_does_not_cost_the_run_that_it_was_asked_of(campaign,
 
 
 def test_a_worker_needs_the_plugin_of_a_score(campaign):
-    from skillframe.campaign.identity import identity, needed_plugins
+    from skillframe.campaign.provenance import identity, needed_plugins
 
     spec = CampaignSpec.from_toml(campaign(["way"]) / "campaign.toml")
     assert needed_plugins(spec, identity()) >= {"skillframe", "dist-measured"}
     plain = CampaignSpec(name="x", seed=1, trials=1, robot="panda", world="free", skills=(), scores=("way",))
-    assert needed_plugins(plain, identity()) == {"skillframe", "dist-measured"}
+    assert needed_plugins(plain, identity()) == {"skillframe-worlds", "dist-measured"}
 
 
+@pytest.mark.needs_plugins
+@pytest.mark.slow
 def test_a_report_shows_the_scores_of_a_campaign_and_of_a_run_without_the_plugin(campaign, tmp_path, monkeypatch):
     out = campaign(["way", "last"])
     run(["run", "hold:demo.npz", "--world", "free", "--robot", "free_tool", "--score", "way", "--out", "run.npz", "-q"])
-    monkeypatch.setenv("SKILLFRAME_PLUGINS", "")
+    monkeypatch.setenv("SKILLFRAME_PLUGINS", "reports")
     from skillframe.extend.registry import registry
 
     registry.cache_clear()

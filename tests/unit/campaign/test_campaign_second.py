@@ -4,16 +4,16 @@ import csv
 import math
 
 import pytest
+from skillframe_reports.results import read_results
+from skillframe_reports.runs import _story
+from skillframe_testkit.checks.examples import example_demonstrations
 
 from skillframe.campaign.rows import columns, decode, encode, rows_of
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.store import write_results
 from skillframe.cli.main import run
-from skillframe.conformance.examples import example_demonstrations
 from skillframe.execution.trace import Trace
 from skillframe.extend.reading import write_demonstration
-from skillframe.reports.results import read_results
-from skillframe.reports.runs import _story
 from tests.part_meshes import FILE, round_pair, write
 from tests.unit.campaign.test_campaign_scores import PLUGIN
 
@@ -38,6 +38,7 @@ NAMES = ["second.door.travel", "second.stone.moved", "second.stone.turned"]
 @pytest.mark.slow
 def test_a_campaign_s_table_says_how_far_second_parts_moved(tmp_path, monkeypatch, install, fresh_registry):
     install("measured", PLUGIN)
+    monkeypatch.setenv("SKILLFRAME_PLUGINS", "worlds,parts,measured")
     monkeypatch.chdir(tmp_path)
     write_demonstration(example_demonstrations()[0], tmp_path / "demo.npz")
     write(tmp_path, *round_pair(), FILE + SECOND)

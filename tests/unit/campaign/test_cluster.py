@@ -51,7 +51,10 @@ def changed(out, reference):
     return [a for a, b in zip(mine.splitlines(), reference.splitlines(), strict=True) if a != b]
 
 
-def test_workers_give_the_table_of_one_process_listen_on_the_local_host_only_and_end(out, reference):
+@pytest.mark.slow
+def test_workers_give_the_table_of_one_process_listen_on_the_local_host_only_and_end(campaign, tmp_path):
+    out, alone = (fakes.start(campaign(trials=48), tmp_path / name) for name in ("out", "alone"))
+    fakes.run(alone, traces=0)
     listening = set()
 
     def look(progress):
@@ -64,7 +67,7 @@ def test_workers_give_the_table_of_one_process_listen_on_the_local_host_only_and
             someone.bind(("127.0.0.1", 8787))
             someone.listen()
         summary = fakes.run(out, fakes.slow, look, **LIMITS)
-    assert changed(out, reference) == []
+    assert fakes.table(out) == fakes.table(alone)
     assert summary["workers"] == 2
     assert {address for address, _ in listening} == {"127.0.0.1"}
     assert workers_of_this_process() == []
@@ -90,6 +93,7 @@ def test_exactly_the_guilty_trial_is_named(out, reference, misbehave, cause):
     assert summary["complete"]
 
 
+@pytest.mark.slow
 def test_a_slow_trial_that_advances_is_let_go_on_far_beyond_the_time_without_progress(out, reference):
     told = []
     fakes.run(out, fakes.creeps, told.append, workers=1, chunk=64, time_limit_s=1.0, traces=0)  # it takes three seconds
@@ -122,6 +126,7 @@ def test_progress_never_runs_backwards_when_chunks_are_lost(campaign, tmp_path, 
     assert any("a worker was replaced: it was killed while on trials 36 to 37" in p.note for p in told)
 
 
+@pytest.mark.slow
 def test_nobody_without_the_key_can_connect_to_the_local_scheduler(campaign, tmp_path):
     out, ports = fakes.start(campaign(trials=8), tmp_path / "out"), []
 
@@ -182,6 +187,7 @@ if "--multiprocessing-fork" in sys.argv:
 """
 
 
+@pytest.mark.slow
 def test_workers_that_are_killed_at_their_start_end_in_one_sentence(out, tmp_path, monkeypatch):
     (tmp_path / "sitecustomize.py").write_text(KILLED_AT_START)
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
@@ -199,6 +205,7 @@ def test_a_hang_in_a_small_chunk_is_ended_and_named(out, reference):
     assert b"worker died (time limit)" in line
 
 
+@pytest.mark.slow
 def test_how_far_chunks_are_is_told_while_they_run_and_what_a_killed_session_left_is_swept(campaign, tmp_path):
     out = fakes.start(campaign(trials=4), tmp_path / "out")
     (out / "watch").mkdir()
@@ -260,6 +267,7 @@ def test_a_campaign_runs_on_a_scheduler_that_is_there_already(out, reference, tm
     assert changed(out, reference) == []
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_does_not_answer_is_refused_and_the_folder_stays_usable(out, monkeypatch):
     monkeypatch.setattr("skillframe.campaign.cluster.CONNECT_S", 1.0)
     begin = time.monotonic()

@@ -7,8 +7,7 @@ import pytest
 from many_campaigns import IN_ORDER, KINDS, WAYS, count, seen, sobol
 from scipy.stats import binom
 
-from skillframe.campaign.axes import Axis
-from skillframe.campaign.sampling import draws
+from skillframe.campaign.sampling import Axis, draws
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.summary import rates
 

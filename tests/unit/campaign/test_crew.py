@@ -11,7 +11,7 @@ import pytest
 
 import skillframe
 from skillframe.campaign.crew import Crew, SchedulerError
-from skillframe.campaign.identity import Identity, compared, identity, needed_plugins
+from skillframe.campaign.provenance import Identity, compared, identity, needed_plugins
 from skillframe.campaign.spec import CampaignSpec
 from tests.unit.campaign.test_cluster import free_port
 

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import campaign_fakes as fakes
 import pytest
+from skillframe_worlds.peg_in_hole import PegParams
 
 from skillframe.campaign.folder import prepare
 from skillframe.campaign.runner import run_campaign
 from skillframe.campaign.spec import CampaignSpec
 from skillframe.campaign.summary import read_summary
-from skillframe.world.worlds.peg_in_hole import PegParams
 
 CLIENT = f"""
 import sys
@@ -66,7 +66,7 @@ CTRL_C, TERM = (os.killpg, signal.SIGINT, 130), (os.kill, signal.SIGTERM, 143)  
     ("options", "end", "number", "code"),
     [
         pytest.param(ALONE, *CTRL_C, id="int-in one process", marks=pytest.mark.slow),
-        pytest.param(CREW, *CTRL_C, id="int-with a worker"),
+        pytest.param(CREW, *CTRL_C, id="int-with a worker", marks=pytest.mark.slow),
         pytest.param(ALONE, *TERM, id="term-in one process"),
         pytest.param(CREW, *TERM, id="term-with a worker", marks=pytest.mark.slow),
     ],
@@ -102,9 +102,11 @@ def test_ctrl_c_while_a_result_is_fetched_from_dask_prints_no_traceback(tmp_path
     assert check_ended(process, out, 130) == 24  # three chunks of eight, the fourth was on its way
 
 
-FULL = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (6000, 6000))"
+# No byte code: the interpreter does not notice that a compiled file was cut at the limit, and keeps it.
+FULL = "import resource, sys; sys.dont_write_bytecode = True; resource.setrlimit(resource.RLIMIT_FSIZE, (6000, 6000))"
 
 
+@pytest.mark.slow
 def test_a_full_disk_names_the_file_and_exits_2(tmp_path):
     process, out = client(tmp_path, [], prelude=FULL)  # a file may not grow: what a full disk does to a write
     _, errors = process.communicate(timeout=120)

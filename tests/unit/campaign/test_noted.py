@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from skillframe.campaign.noted import setup_notes
+from skillframe.campaign.evaluate import setup_notes
+from skillframe.execution.drive import Setup
 from skillframe.execution.prepare import load_robot_model, load_world
-from skillframe.execution.setup import Setup
-from skillframe.world.sensors import SensorSettings
+from skillframe.world.quantities import SensorSettings
 
 pytestmark = pytest.mark.needs_plugins
 

@@ -12,12 +12,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from skillframe.campaign.packed import PackedRows
+from skillframe.campaign.partial_results import status_of
+from skillframe.campaign.row_format import PackedRows
 from skillframe.campaign.rows import ENDS, JUDGED_MEASURES, MEASURES
-from skillframe.campaign.status import status_of
 from skillframe.campaign.store import RowLog, read_content
 from skillframe.errors import InputError
-from skillframe.execution.tracemeta import SHARE_JOINTS
+from skillframe.execution.trace import SHARE_JOINTS
 
 VALUES = st.one_of(
     st.floats(),
@@ -173,7 +173,7 @@ EDITS = [
     (row_with(layout=[0]), r"is of layout \[0\], which no line states"),
     (row_with(layout=True), "is of layout True, which no line states"),
     (row_with(trial="0"), "trial is '0'"),
-    (row_with(trial=3), "is a second row of trial 3|start.tilt_y is .*; trial 3 of this campaign draws"),
+    (row_with(trial=3), "is a second row of trial 3|start.tilt_y is .*; trial 3 of this campaign samples"),
     (row_with(trial=999), "trial 999 is none of this campaign's"),
     (lambda records: [r for r in records if "columns" not in r], "is of layout 0, which no line states"),
     (lambda records: records + [r for r in records if "columns" in r], "states layout 0, which is no number or"),

@@ -1,25 +1,20 @@
 import csv
-import re
 from itertools import permutations
 
 import numpy as np
 import pytest
 from campaign_fakes import FakeParams, run, start, table, write_campaign
-from click.testing import CliRunner
+from skillframe_reports.sources import read_folder
 
-from skillframe.campaign.claims.compare import compare
-from skillframe.campaign.claims.trials import read_trials
+from skillframe.campaign.partial_results import status_of
 from skillframe.campaign.race import Race, told
 from skillframe.campaign.rows import rows_of
 from skillframe.campaign.sampling import draws
 from skillframe.campaign.spec import CampaignSpec, RaceKeys
 from skillframe.campaign.statistics import confidence_sequence
-from skillframe.campaign.status import status_of
 from skillframe.campaign.store import read_content
 from skillframe.campaign.summary import read_summary
-from skillframe.cli.compare import command
 from skillframe.errors import InputError
-from skillframe.reports.sources import read_folder
 
 LABELS = ("good", "middle", "bad")
 RACE = "[race]\nevery = 16"
@@ -186,14 +181,11 @@ def test_a_skill_that_was_left_out_is_marked_wherever_its_rate_is_shown(race_fol
     assert {(r["skill"], r["left_out_after"]) for r in rows} == marks
     chapter = read_folder(race_folder)
     assert chapter.results.mark("replay:demo.npz") == f", left out after {n} trials"
-    assert chapter.results.interval_name == "95 % interval, valid at every look"
+    assert chapter.results.interval_name == "95 % confidence interval (valid at every look)"
     assert any("left out after" in text for text in chapter.notes)
-    from skillframe.reports.headline import _tile
+    from skillframe_reports.headline import _tile
 
     assert f"left out after {n} trials" in str(_tile(chapter.results, "replay:demo.npz", 0))
-    said = CliRunner().invoke(command, [str(race_folder / "results.csv")]).output
-    assert re.search(rf"replay:demo.npz +{n}, left out", said)
-    assert f"was left out of the race after {n} trials" in said
 
 
 def test_the_page_of_a_race_that_was_killed_has_the_marks_that_its_table_will_have(race_folder):
@@ -206,15 +198,6 @@ def test_the_page_of_a_race_that_was_killed_has_the_marks_that_its_table_will_ha
     assert killed.rate("replay:late.npz") == whole.rate("replay:late.npz")
 
 
-def test_compare_says_the_same_of_a_races_table_and_does_not_call_its_rows_missing(race_folder):
-    run(race_folder, reach, traces=0)
-    trials = read_trials(race_folder / "results.csv")
-    assert trials.doubts == ()
-    assert {pair.better for pair in compare(trials).pairs if "a.skill.json" in (pair.first, pair.second)} == {
-        "a.skill.json"
-    }
-
-
 def test_the_sentence_on_a_skill_that_was_left_out():
     found = {"after": 64, "better": "good", "only_better": 20, "only_it": 2, "p_value": 0.00213}
     assert told("flat", found, 400, "Holm over 3 pairs") == (
@@ -224,7 +207,7 @@ def test_the_sentence_on_a_skill_that_was_left_out():
 
 
 WRONG = {
-    "[race]\nevery = 0": "race.every: is 0; give the trials between two looks",
+    "[race]\nevery = 0": "race.every: is 0; give the trials between two tests",
     "[race]\nalpha = 0.7": "race.alpha: is 0.7; give a number between 0 and 0.5",
     "[race]\nevry = 3": "did you mean 'every'?",
     "[race]\n[stop]\ninterval_width = 0.1": "would both say when the campaign ends; keep one of the two",

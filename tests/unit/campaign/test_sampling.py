@@ -3,8 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from skillframe.campaign.axes import Axis
-from skillframe.campaign.sampling import draws, trial_rng, trial_rngs
+from skillframe.campaign.sampling import Axis, draws, trial_rng, trial_rngs
 from skillframe.campaign.spec import CampaignSpec
 
 INDEPENDENT = {

@@ -3,10 +3,10 @@ from campaign_fakes import FakeParams, write_campaign
 from hypothesis import given
 from hypothesis import strategies as st
 
-from skillframe.campaign.axes import Axis
 from skillframe.campaign.folder import load, prepare, to_toml
+from skillframe.campaign.sampling import Axis
 from skillframe.campaign.spec import CampaignSpec
-from skillframe.document.source import parse_source
+from skillframe.document.file import parse_source
 from skillframe.errors import InputError, SkillframeError
 
 

@@ -8,12 +8,12 @@ import pytest
 from campaign_fakes import dark, run, start
 from hypothesis import given
 from hypothesis import strategies as st
+from skillframe_reports.results import read_results
 
-from skillframe.campaign.lock import FolderLock, holder
+from skillframe.campaign.folder import FolderLock, holder
 from skillframe.campaign.rows import MEASURES, decode, differences, encode
 from skillframe.campaign.store import RowLog, read_content, repair_tail
 from skillframe.errors import InputError
-from skillframe.reports.results import read_results
 
 
 @pytest.fixture
@@ -80,6 +80,7 @@ def test_a_torn_line_cut_at_every_byte_is_taken_off_and_no_more(out):
         assert read_content(out).done.keys() == done.keys()
 
 
+@pytest.mark.slow
 def test_a_resume_after_a_torn_line_ends_in_the_identical_table(out):
     run(out, chunk=3, traces=0)
     reference, content = (out / "results.csv").read_bytes(), (out / "rows.jsonl").read_bytes()
@@ -171,7 +172,7 @@ def test_a_lock_from_another_host_is_refused_with_what_to_do(out):
 
 def test_the_lock_ends_with_a_killed_process(out):
     code = (
-        "import sys, os, signal, pathlib; from skillframe.campaign.lock import FolderLock\n"
+        "import sys, os, signal, pathlib; from skillframe.campaign.folder import FolderLock\n"
         f"FolderLock(pathlib.Path({str(out)!r})).__enter__(); os.kill(os.getpid(), signal.SIGKILL)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == -9

@@ -4,12 +4,12 @@ import json
 
 import campaign_fakes as fakes
 import pytest
+from skillframe_reports.sources import read_folder
 
 from skillframe import files
-from skillframe.campaign.replay import replay_trial
-from skillframe.campaign.status import status_of
+from skillframe.campaign.partial_results import status_of
+from skillframe.campaign.runner import replay_trial
 from skillframe.errors import InputError
-from skillframe.reports.sources import read_folder
 
 
 @pytest.fixture
@@ -64,8 +64,8 @@ EDITS = [
     (edit(trial=999), r"trial 999 is none of this campaign's \(0 to 5\)"),
     (edit(trial=-1), "trial -1 is none"),
     (edit(skill="b.skill.json"), "its skill 'b.skill.json' is none of this campaign's"),
-    (another("start.tilt_y", 1.0 + 2**-50), "start.tilt_y is .*; trial 0 of this campaign draws"),
-    (edit(trial=3), "is a second row of trial 3|start.tilt_y is .*; trial 3 of this campaign draws"),
+    (another("start.tilt_y", 1.0 + 2**-50), "start.tilt_y is .*; trial 0 of this campaign samples"),
+    (edit(trial=3), "is a second row of trial 3|start.tilt_y is .*; trial 3 of this campaign samples"),
     (twice, "is a second row of trial 0"),
     *((without(key), f"has no '{key}'") for key in ("trial", "skill", "seed", "success", "failure", "duration_s")),
     (without("world.friction"), "has no 'world.friction'"),
@@ -128,7 +128,7 @@ def test_old_rows_that_hold_trouble_of_the_machine_are_said_to_be_no_result(out)
     )  # fmt: skip
     fakes.edit_rows(out, lost, old=True)
     text = status_of(out, fakes.FakeParams)["remarks"][0]
-    assert text.startswith("1 of 12 rows look like trouble of the machine, and not of a skill")
+    assert text.startswith("1 of 12 rows are probably trouble of the machine, and not of a skill")
     assert "campaign run" in text
 
 

@@ -7,13 +7,12 @@ import pytest
 from campaign_fakes import table
 
 from skillframe.campaign import evaluate
-from skillframe.campaign.driver import CampaignError
+from skillframe.campaign.driver import CampaignError, attempt
 from skillframe.campaign.folder import load
-from skillframe.campaign.replay import replay_trial
 from skillframe.campaign.rows import ChunkJob
-from skillframe.campaign.trouble import attempt
+from skillframe.campaign.runner import replay_trial
 from skillframe.errors import InputError, MissingDependency, SkillframeError, UnknownName
-from skillframe.fmu.library import find_fmu
+from skillframe.fmu.build import find_fmu
 
 
 def test_a_file_that_vanishes_stops_the_campaign_and_resume_ends_in_the_identical_table(out, reference):
@@ -126,6 +125,7 @@ def test_a_folder_that_is_moved_while_it_runs_stops_it_and_is_gone_on_with_where
     assert table(moved) == reference(48)
 
 
+@pytest.mark.slow
 def test_one_worker_in_trouble_gets_no_more_work_and_the_others_do_its_trials(out, reference):
     told = []
     fakes.run(out, fakes.needs_luck, told.append, workers=2, chunk=8, traces=0)

@@ -5,16 +5,16 @@ import json
 import numpy as np
 import pytest
 from campaign_fakes import TEXT, FakeParams, edit_rows, good, run, start, write_campaign
+from skillframe_worlds.peg_in_hole import PegParams
 
 from skillframe.campaign import evaluate
 from skillframe.campaign.folder import prepare
+from skillframe.campaign.partial_results import status_of
 from skillframe.campaign.runner import Options, run_campaign
 from skillframe.campaign.spec import CampaignSpec
-from skillframe.campaign.status import status_of
 from skillframe.campaign.summary import comparisons, read_summary
 from skillframe.cli.campaign_words import show_rates
 from skillframe.cli.main import run as command
-from skillframe.world.worlds.peg_in_hole import PegParams
 
 GRID = '"world.clearance" = {{ grid = {{ from = 0.0001, to = 0.001, count = 12 }} }}'
 PEG = TEXT.replace('"fake"\nskills', '"peg_in_hole"\nskills').replace("{extra}", GRID)

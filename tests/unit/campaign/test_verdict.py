@@ -11,9 +11,8 @@ from scipy.stats import binom
 
 from skillframe.campaign.folder import load
 from skillframe.campaign.spec import Expect
-from skillframe.campaign.statistics import Interval, clopper_pearson
+from skillframe.campaign.statistics import Interval, clopper_pearson, judged, trials_without_failure, verdict_of
 from skillframe.campaign.summary import below_bar, read_summary
-from skillframe.campaign.verdict import judged, trials_without_failure, verdict_of
 
 
 @given(wins=st.integers(0, 60), more=st.integers(0, 60), required=st.floats(0.0, 1.0))

@@ -12,8 +12,8 @@ from skillframe.errors import EXTRAS
 
 @pytest.fixture(autouse=True)
 def no_drawing(monkeypatch):
-    """Whether OpenGL draws takes seconds to find out; `tests/unit/reports/test_opengl.py` does."""
-    monkeypatch.setattr("skillframe.reports.opengl.backend", lambda: "egl")
+    """Whether OpenGL draws takes seconds to find out; `plugins/reports/tests/test_opengl.py` does."""
+    monkeypatch.setattr("skillframe_reports.opengl.backend", lambda: "egl")
 
 
 def findings(capsys, code=0):
@@ -69,7 +69,7 @@ def test_a_missing_library_of_an_extra_is_not_required_and_the_extra_installs_it
     assert rows["skillframe[sim]"]["found"] == f"pin {metadata.version('pin')}"
     assert rows["skillframe[sim]"]["fix"] == f"{sys.executable} -m pip install 'skillframe[sim]'  # lacks mujoco>=4.0"
     assert "lacks mujoco>=4.0" in rows["skillframe[crane]"]["fix"]
-    assert not rows["skillframe[video]"]["fix"]
+    assert not rows["skillframe[parts]"]["fix"]
 
 
 def test_a_library_that_is_too_old_is_told_with_both_versions(capsys, monkeypatch):
@@ -120,13 +120,3 @@ def test_for_people_there_is_a_table_and_a_line_for_each_missing_thing(capsys, m
     text = capsys.readouterr().out
     assert text.startswith("what") and "numpy" in text
     assert "recordings: export SKILLFRAME_RECORDINGS=FOLDER" in text
-
-
-@pytest.mark.parametrize("found", ["egl", None])
-def test_the_renderer_of_videos_is_told_or_how_to_get_one(capsys, monkeypatch, found):
-    monkeypatch.setattr("skillframe.reports.opengl.backend", lambda: found)
-    row = findings(capsys)["OpenGL"]
-    assert row["found"] == (found or "") and ("libosmesa6" in row["fix"]) == (found is None) and not row["required"]
-    monkeypatch.setattr(doctor, "find_spec", lambda name: None)
-    row = findings(capsys)["OpenGL"]
-    assert row["found"] == "" and "pip install 'skillframe[sim]'" in row["fix"]

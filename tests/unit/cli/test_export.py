@@ -3,9 +3,9 @@ from pathlib import Path
 
 import pytest
 import yaml
+from skillframe_testkit.checks.examples import example_demonstrations
 
 from skillframe.cli.main import run
-from skillframe.conformance.examples import example_demonstrations
 from skillframe.extend.reading import write_demonstration
 
 pytestmark = pytest.mark.needs_plugins
@@ -24,15 +24,15 @@ def skill(tmp_path: Path) -> str:
 @pytest.mark.parametrize("form", ["crisp", "aic_motion_update", "cartesian_controllers"])
 def test_a_learned_skill_is_written_as_yaml_of_every_format(skill: str, form: str, tmp_path: Path) -> None:
     out = tmp_path / "out.yaml"
-    assert run(["export", skill, "--to", form, "--attitude", "1,0,0,0", "--out", str(out)]) == 0
+    assert run(["export", skill, "--to", form, "--orientation", "1,0,0,0", "--out", str(out)]) == 0
     assert isinstance(yaml.safe_load(out.read_text()), dict)
     assert "# slide.skill.json: push along -z at 20 mm/s" in out.read_text()
 
 
 def test_the_formats_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(["export", "--list", "--json"]) == 0
+    assert run(["export", "--json"]) == 0
     assert [f["name"] for f in json.loads(capsys.readouterr().out)] == [
-        "aic_motion_update", "cartesian_controllers", "crisp",
+        "aic_motion_update", "cartesian_controllers", "crisp", "urscript",
     ]  # fmt: skip
 
 
@@ -46,8 +46,8 @@ def test_the_centre_of_compliance_can_be_elsewhere_than_where_it_was_learned(ski
     ("options", "said"),
     [
         (["--to", "crips"], "did you mean 'crisp'"),
-        (["--to", "cartesian_controllers"], "--attitude"),
-        (["--to", "crisp", "--attitude", "1,1,0,0"], "not a unit quaternion"),
+        (["--to", "cartesian_controllers"], "--orientation"),
+        (["--to", "crisp", "--orientation", "1,1,0,0"], "not a unit quaternion"),
         (["--to", "crisp", "--phase", "2"], "no phase 2"),
         (["--to", "crisp", "--coc", "tpi"], "tpi"),
         ([], "missing '--to'"),
@@ -75,5 +75,5 @@ def test_export_says_on_the_terminal_and_in_json_what_it_was_checked_against_and
     answer = json.loads(capsys.readouterr().out)
     assert answer["checked_against"].startswith("intrinsic-dev/aic db40abc")
     assert any("10 N" in note for note in answer["notes"])
-    assert run(["export", "--list", "--json"]) == 0
+    assert run(["export", "--json"]) == 0
     assert all(f["checked_against"] for f in json.loads(capsys.readouterr().out))

@@ -8,8 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from skillframe.campaign.runner import Progress
-from skillframe.cli.campaign_words import progress as campaign_progress
-from skillframe.cli.output import laid_out, note, progress, quiet_option, table
+from skillframe.cli.output import campaign_progress, laid_out, note, progress, quiet_option, table
 
 
 def test_long_work_in_a_pipe_says_a_line_per_tenth_on_stderr(capsys: pytest.CaptureFixture[str]) -> None:
@@ -44,6 +43,7 @@ def test_a_table_of_a_width_keeps_it_and_never_breaks_a_word(rows: list[list[str
 
 
 @given(st.lists(st.lists(WORDS, min_size=4, max_size=4), min_size=1, max_size=5))
+@pytest.mark.slow
 def test_a_table_of_a_width_keeps_every_cell_in_its_column_where_its_words_fit(rows: list[list[str]]) -> None:
     width = 4 * 30 + 3 * 2  # four words of the longest kind, and the gaps
     out = StringIO()

@@ -5,26 +5,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from skillframe_reports.provenance import commands
+from skillframe_reports.sources import read_traces
+from skillframe_testkit.checks.examples import example_demonstrations
 
 from skillframe.cli.main import run
-from skillframe.conformance.examples import example_demonstrations
 from skillframe.execution.trace import Trace
 from skillframe.extend.reading import write_demonstration
-from skillframe.reports.provenance import commands
-from skillframe.reports.sources import read_traces
 
 pytestmark = pytest.mark.needs_plugins
 FREE = ["--world", "free", "--robot", "free_tool"]
 
 
 @pytest.fixture
-def skill(tmp_path: Path) -> str:
+def skill(tmp_path):
     path = tmp_path / "left.npz"
     write_demonstration(example_demonstrations()[0], path)
     return f"lmc:{path}"
 
 
-def test_a_run_leaves_a_trace_a_page_and_a_film(skill: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.slow
+def test_a_run_leaves_a_trace_a_page_and_a_film(skill, tmp_path, capsys):
     files = {"trace": tmp_path / "run.npz", "replay": tmp_path / "run.html", "video": tmp_path / "run.mp4"}
     options = ["--out", str(files["trace"]), "--replay", str(files["replay"]), "--video", str(files["video"])]
     code = run(["run", skill, *FREE, "--duration", "0.1", *options, "--json"])
@@ -36,9 +37,8 @@ def test_a_run_leaves_a_trace_a_page_and_a_film(skill: str, tmp_path: Path, caps
     assert all(path.stat().st_size > 1000 for path in files.values())
 
 
-def test_what_the_report_says_to_repeat_a_run_repeats_it(
-    skill: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.slow
+def test_what_the_report_says_to_repeat_a_run_repeats_it(skill, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     options = [*FREE, "--coc", "wrist", "--set", "start.offset_x=0.002", "--seed", "3"]
     run(["run", skill, *options, "--duration", "0.3", "--rate", "50", "--out", "a.npz"])
@@ -51,11 +51,9 @@ def test_what_the_report_says_to_repeat_a_run_repeats_it(
     assert np.array_equal(again.wrench, first.wrench)
 
 
-def test_a_film_that_could_not_be_written_is_refused_before_the_run(
-    skill: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_film_that_could_not_be_written_is_refused_before_the_run(skill, tmp_path, capsys):
     assert run(["run", skill, "--world", "free", "--out", str(tmp_path / "run.npz"), "--video", "run.gif"]) == 2
-    assert "not a name of a film" in capsys.readouterr().err
+    assert "not the name of a video" in capsys.readouterr().err
     assert not (tmp_path / "run.npz").exists()
 
 
@@ -73,19 +71,15 @@ def test_a_film_that_could_not_be_written_is_refused_before_the_run(
         (["--set", "sensor.force_noise=-1"], "sensor.force_noise: -1 N is beyond 0N to 100N"),
         (["--coc", "10,0,0"], "point 10,0,0: x: 10 m is beyond -3m to 3m, as no tool is longer; did you mean 10mm?"),
         (["--coc", "0,0,5deg"], "expected a quantity in m, got 5deg"),
-        (["--set", "actuator.delay=1"], "has no actuators of its own"),
+        (["--set", "actuator.delay=1"], "has no drive with such a quantity"),
     ],
 )
-def test_numbers_that_make_no_sense_are_refused(
-    skill: str, capsys: pytest.CaptureFixture[str], options: list[str], message: str
-) -> None:
+def test_numbers_that_make_no_sense_are_refused(skill, capsys, options, message):
     assert run(["run", skill, *FREE, *options]) == 2
     assert message in capsys.readouterr().err
 
 
-def test_a_run_that_diverges_exits_1_with_time_cause_and_trace(
-    skill: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_that_diverges_exits_1_with_time_cause_and_trace(skill, tmp_path, capsys):
     light = ["--world", "valley", "--robot", "panda", "--set", "robot.mass_scale=1e-6"]
     assert run(["run", skill, *light, "--out", str(tmp_path / "run.npz"), "--json"]) == 1
     said = json.loads(capsys.readouterr().out, parse_constant=pytest.fail)
@@ -97,9 +91,7 @@ def test_a_run_that_diverges_exits_1_with_time_cause_and_trace(
 
 
 @pytest.mark.slow  # a panda on a 60 mm way
-def test_a_run_names_its_robot_and_world_and_how_deep_it_got(
-    skill: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_names_its_robot_and_world_and_how_deep_it_got(skill, tmp_path, capsys):
     where = ["--world", "peg_in_hole", "--set", "start.offset_x=1mm", "--duration", "1"]
     run(["run", skill, *where, "--json"])
     out, err = capsys.readouterr()
@@ -117,16 +109,12 @@ def test_a_run_names_its_robot_and_world_and_how_deep_it_got(
     assert f"  panda in peg_in_hole, inserted {1000 * said['progress']['reached_m']:.0f} of 60 mm\n" in out
 
 
-def test_a_run_where_nothing_is_deep_names_robot_and_world_alone(
-    skill: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_run_where_nothing_is_deep_names_robot_and_world_alone(skill, capsys):
     run(["run", skill, *FREE, "--duration", "0.1"])
     assert " free_tool in free\n" in capsys.readouterr().out
 
 
-def test_millimetres_typed_as_metres_are_warned_of_and_degrees_refused(
-    skill: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_millimetres_typed_as_metres_are_warned_of_and_degrees_refused(skill, capsys):
     run(["run", skill, *FREE, "--duration", "0.02", "--set", "start.offset_y=2", "--quiet"])
     assert "warning: start.offset_y is 2 m as typed; if millimetres are meant, type start.offset_y=2mm" in (
         capsys.readouterr().err
@@ -140,7 +128,8 @@ def test_millimetres_typed_as_metres_are_warned_of_and_degrees_refused(
     assert "as typed" not in capsys.readouterr().err
 
 
-def test_a_report_names_robot_and_world(skill: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.slow
+def test_a_report_names_robot_and_world(skill, tmp_path, capsys):
     trace, page = str(tmp_path / "run.npz"), str(tmp_path / "run.html")
     run(["run", skill, *FREE, "--duration", "0.1", "--out", trace])
     capsys.readouterr()
@@ -152,7 +141,7 @@ def test_a_report_names_robot_and_world(skill: str, tmp_path: Path, capsys: pyte
     assert (said["file"], said["bytes"]) == (page, Path(page).stat().st_size)
 
 
-def test_a_run_says_both_halves_of_its_end(skill: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_says_both_halves_of_its_end(skill, capsys):
     """The goal of "free" holds everywhere, and a tenth of a second is too short for the skill to end."""
     run(["run", skill, *FREE, "--duration", "0.1", "--json"])
     captured = capsys.readouterr()

@@ -7,10 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from skillframe.config import build
-from skillframe.config.fields import require_ranges, settings_of
-from skillframe.config.ranges import Range, range_of, require_within, shown
-from skillframe.config.units import UNITS, si, unit_of
+from skillframe.config import build, require_ranges, settings_of
+from skillframe.config.units import UNITS, Range, range_of, require_within, shown, si, unit_of
 from skillframe.errors import InputError
 
 NEAR, LEAN = Range(-3.0, 3.0, "as far as arms reach"), Range(-math.pi / 2, math.pi / 2)

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from skillframe.control.admittance import QUIET_FORCE, QUIET_TORQUE, AdmittanceLaw, Bounds, felt
-from skillframe.control.ringing import RingWatch
+from skillframe.control.admittance import QUIET_FORCE, QUIET_TORQUE, AdmittanceLaw, Bounds, RingWatch, felt
 from skillframe.errors import InputError
 from skillframe.frames import Pose, rotation_matrix, rotation_vector
 from skillframe.robot.interface import VIRTUAL_INERTIA, VIRTUAL_MASS
@@ -119,7 +118,7 @@ def test_while_no_contact_is_felt_an_error_of_the_tare_moves_nothing_and_in_cont
 
 def test_a_skill_that_is_stiffer_than_arm_and_contact_together_is_refused_with_both_figures():
     law = AdmittanceLaw(1, 2e-3, Bounds((1.0, 1.0), (20.0, 2.0), 5e4))
-    with pytest.raises(InputError, match=r"asks for 6e\+04 N/m.*5e\+04 N/m.*cannot hold it"):
+    with pytest.raises(InputError, match=r"commands 6e\+04 N/m.*5e\+04 N/m.*cannot hold it"):
         law.step(command(np.diag([6e4, 1, 1, 1, 1, 1])), Pose(np.zeros((1, 3)), np.eye(3)[None]), np.zeros((1, 6)))
 
 
@@ -165,7 +164,7 @@ def test_the_least_stable_damping_is_the_published_tables_and_within_the_formula
 
 def pressed(loop, damping, seconds, push=0.0, speed=0.0, one_side=False, watch=None):
     """Contact forces over time of this law, with the arm of the equations between it and the wall."""
-    from skillframe.control.inner_loop import InnerLoop
+    from skillframe.control.motors import InnerLoop
 
     arm = arm_of(loop)
     h, heavy = arm.ticks * 1e-3, 1e7  # a joint so heavy that the wall does not move it from where its servo wants it

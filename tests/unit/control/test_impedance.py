@@ -8,10 +8,9 @@ from skillframe.control.impedance import (
     critical_damping,
     impedance_wrench,
     null_space_damping,
-    pose_error,
     task_inertia,
 )
-from skillframe.frames import Pose, move_twist, move_wrench, rotation_matrix
+from skillframe.frames import Pose, move_twist, move_wrench, pose_error, rotation_matrix
 
 seeds = st.integers(0, 2**31)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from skillframe.control.inner_loop import InnerLoop
+from skillframe.control.motors import InnerLoop
 from skillframe.robot.interface import LOOP_DAMPING, SERVO, Control
 
 DT = 1e-3
@@ -112,7 +112,7 @@ def test_a_joint_that_was_pushed_off_comes_back_as_two_equal_time_constants_say(
 
 def test_the_filters_step_does_not_depend_on_how_often_the_tick_is_cut():
     """Exact: two ticks of half the length are one tick."""
-    from skillframe.control.inner_loop import _exact_step
+    from skillframe.control.motors import _exact_step
 
     for kind in ("position", "velocity"):
         one, two = (np.array([*_exact_step(arm(kind), dt), (0.0, 0.0, 1.0)]) for dt in (2e-3, 1e-3))

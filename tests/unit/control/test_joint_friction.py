@@ -6,11 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from skillframe.control.joint_friction import SLOW, FrictionCompensation
+from skillframe.control.motors import SLOW, FrictionCompensation
 from skillframe.frames import norm
-from skillframe.robot.joint_settings import Dynamics, JointDynamics
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import Limits, load_robot
+from skillframe.robot.tables import Dynamics, JointDynamics
 from tests.laws.pushing import Push, impedance
 from tests.laws.runs import run, setup
 

@@ -7,18 +7,18 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from skillframe_testkit.checks.examples import example_demonstrations
 
 from skillframe.cli.main import run as command
-from skillframe.conformance.examples import example_demonstrations
 from skillframe.control.motors import MOTOR_S, JointLimits, Motors, joint_limits, unstated
-from skillframe.execution.tracemeta import SHARE_JOINTS, SHARES
+from skillframe.execution.trace import SHARE_JOINTS, SHARES
 from skillframe.extend.reading import write_demonstration
 from skillframe.frames import norm
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import Limits, load_robot, robot_names
 from skillframe.world.convert import build_spec
+from skillframe.world.quantities import SensorSettings
 from skillframe.world.scene import Holder
-from skillframe.world.sensors import SensorSettings
 from tests.laws.pushing import Hold, Push, impedance
 from tests.laws.runs import run, setup
 
@@ -50,7 +50,11 @@ def test_torques_are_held_to_the_effort_and_no_limit_is_no_limit():
 @pytest.mark.parametrize(
     ("what", "code", "text"),
     [
-        ({"torque": (13.1, 0.0)}, "motor", "motor limit: shoulder at its 10 Nm for 100 ms, the law asks for 13.1 Nm"),
+        (
+            {"torque": (13.1, 0.0)},
+            "motor",
+            "motor limit: shoulder at its 10 Nm for 100 ms, the controller commands 13.1 Nm",
+        ),
         ({"velocity": (0.0, -0.6)}, "speed", "joint speed limit: slide at 0.6 m/s, above its 0.5 m/s, for 100 ms"),
         ({"position": (-2.01, 0.2)}, "range", "joint range: shoulder pressed against its end at -2 rad for 100 ms"),
         ({"position": (0.0, 0.402)}, "range", "joint range: slide pressed against its end at 0.4 m for 100 ms"),
@@ -129,6 +133,7 @@ def insertion(robot):
     return run(Push((0.0, 0.0, -1.0), impedance("x", "y"), speed=0.03, stall=True), now, duration_s=4.0, trace_hz=10)
 
 
+@pytest.mark.slow
 def test_a_sound_arm_inserts_and_one_whose_motors_give_a_hundredth_of_a_newton_metre_does_not():
     sound, weak, slow = insertion(panda()), insertion(panda(effort="0.01")), insertion(panda(velocity="0.0001"))
     assert sound.success[0], sound.failure[0]
@@ -255,10 +260,10 @@ def test_a_campaign_its_report_and_a_run_say_what_the_urdf_does_not_limit(tmp_pa
     write_demonstration(example_demonstrations()[0], tmp_path / "left.npz")
     skill = f"lmc:{tmp_path / 'left.npz'}"
     text = "the URDF gives no effort or no velocity for joint3; what it does not give counts as unlimited"
-    told = ["--world", "edge", "--robot", str(folder), "--duration", "0.1", "--json"]
+    told = ["--world", "valley", "--robot", str(folder), "--duration", "0.1", "--json"]
     assert command(["run", skill, *told]) == 1
     assert (text in json.loads(capsys.readouterr().out)["notes"]) != given
-    plan = ['name = "c"', "seed = 1", "trials = 2", "duration_s = 0.1", 'robot = "my_panda"', 'world = "edge"']
+    plan = ['name = "c"', "seed = 1", "trials = 2", "duration_s = 0.1", 'robot = "my_panda"', 'world = "valley"']
     plan += [f'skills = ["{skill}"]', "[vary]", '"world.friction" = { uniform = [0.1, 0.2] }', ""]
     (tmp_path / "c.toml").write_text("\n".join(plan))
     assert command(["campaign", "run", str(tmp_path / "c.toml"), "--out", str(tmp_path / "c")]) == 0

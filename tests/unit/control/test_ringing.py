@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from skillframe.control.ringing import MEMORY, SHARE, SLOW, RingWatch
+from skillframe.control.admittance import MEMORY, SHARE, SLOW, RingWatch
 
 DT, DELAY, PUSH = 2e-3, 0.04, 20.0
 

@@ -3,19 +3,17 @@
 import numpy as np
 import pytest
 
-from skillframe.control.admittance import AdmittanceLaw, Bounds
+from skillframe.control.admittance import AdmittanceLaw, Bounds, RingWatch
 from skillframe.control.controller import ImpedanceController, Reading
-from skillframe.control.inner_loop import InnerLoop
 from skillframe.control.joint_steps import JointRange, JointSteps
 from skillframe.control.limits import LimitGuard
-from skillframe.control.motors import JointLimits, Motors
-from skillframe.control.ringing import RingWatch
+from skillframe.control.motors import InnerLoop, JointLimits, Motors
 from skillframe.control.ticks import compiled_filter
-from skillframe.fmu import native
+from skillframe.fmu import build
 from skillframe.frames import Pose, move_wrench, rotation_matrix
 from skillframe.robot.interface import Control
 from skillframe.robot.spec import Limits
-from skillframe.signals.kalman import WrenchFilter
+from skillframe.signals import WrenchFilter
 from skillframe.skill import Command, Impedance, no_reasons
 from tests import fmu_cache
 
@@ -177,5 +175,5 @@ def test_a_folder_that_cannot_be_written_is_no_error(monkeypatch, tmp_path):
     def refuse(source):
         raise PermissionError(13, "Permission denied", str(source))
 
-    monkeypatch.setattr(native, "build_source", refuse)
-    assert native.library(tmp_path / "other.c") is None
+    monkeypatch.setattr(build, "build_source", refuse)
+    assert build.library(tmp_path / "other.c") is None

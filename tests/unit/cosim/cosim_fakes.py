@@ -5,11 +5,11 @@ import math
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from skillframe_hydraulics.cylinder import equations as eq
 
 from skillframe.cosim import Motion
-from skillframe.fmu.library import fmu_folders
+from skillframe.fmu.build import fmu_folders
 from skillframe.fmu.table import read_table, rows
-from skillframe.machine.cylinder import equations as eq
 
 GRAVITY = 9.81
 CYLINDER = {
@@ -95,10 +95,10 @@ def monolithic(boom, values, commands, hold, tolerance=1e-9):
             now = demand + way * min(t / arrival, 1.0) if arrival > 0 else demand
             cylinder = y[2:, None]
             force = eq.piston_force(p, cylinder, x * one, v * one)[0]
-            oil = eq.rates(p, cylinder, eq.PistonMotion(x * one, v * one, now * one, 0 * one))[:, 0]
+            oil = eq.rates(p, cylinder, eq.PistonMotion(x * one, v * one, now * one))[:, 0]
             return np.concatenate([boom.rates(y[:2], force), oil])
 
-        atol = [1e-11, 1e-11, 1e-10, 1e-8, 0.1, 0.1, 0.1, 1e-13]
+        atol = [1e-11, 1e-11, 1e-10, 1e-8, 0.1, 0.1, 1e-13]
         pieces = sorted({0.0, min(arrival, hold * 1e-3), hold * 1e-3})
         for begin, end in itertools.pairwise(pieces):
             wanted = times[(times > begin) & (times <= end + 1e-12)]

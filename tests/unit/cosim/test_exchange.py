@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from skillframe.cosim import CosimSettings, Master
-from skillframe.execution.drives.coupled import CoupledPlant
+from skillframe.execution.drives.actuated import CoupledPlant
 from skillframe.fmu.actuator import ActuatorSpec
 from skillframe.fmu.opening import open_actuators
 from skillframe.world.placement import fixture_poses

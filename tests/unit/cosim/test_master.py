@@ -7,8 +7,8 @@ import pytest
 from cosim_fakes import CYLINDER, Boom, monolithic
 
 from skillframe.cosim import CosimSettings, Master, bond_work, coupling_numbers, require_stable
-from skillframe.cosim.bond import BLOCK, BondLedger
 from skillframe.cosim.coupling import StepTooLarge
+from skillframe.cosim.energy_balance import BLOCK, BondLedger
 from skillframe.errors import SkillframeError
 from skillframe.fmu.actuator import ActuatorSpec
 from skillframe.fmu.opening import open_actuators
@@ -57,6 +57,7 @@ PUBLISHED = {400.0: (7.0e-5, 0.014), 20.0: (2.1e-3, None), 5.0: (3.9e-3, None)}
 
 @pytest.mark.slow
 @pytest.mark.parametrize("mass", PUBLISHED)
+@pytest.mark.figures
 def test_a_boom_follows_one_system_solved_by_radau_within_twice_the_earlier_figures(mass):
     boom = Boom(mass)
     reference = monolithic(boom, CYLINDER | {"initial_force": boom.holding_force()}, COMMANDS, HOLD)

@@ -69,7 +69,7 @@ def test_a_converted_file_is_not_converted_again(
 def test_weight_without_a_known_payload_stays_and_is_said(rows: list[list[str]], write: Write) -> None:
     read = read_demonstration(write(rows), wrench_includes_tool_weight=True)
     assert read.meta["wrench"]["includes_tool_weight"] is True
-    assert any("skillframe condition" in note for note in read.meta["reading"])
+    assert any("skillframe filter" in note for note in read.meta["reading"])
 
 
 def turning(seed: int, mass: float) -> tuple[Demonstration, Float, Float]:

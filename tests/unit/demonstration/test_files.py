@@ -13,10 +13,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from skillframe.demonstration.metafile import toml_text
+from skillframe.demonstration.options import toml_text
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
 from skillframe.extend.reading import check_writable, read_demonstration, write_demonstration
+from skillframe.extend.registry import Registry
 from skillframe.frames import norm
 
 finite = st.floats(-1e6, 1e6, allow_nan=False, width=64)
@@ -60,6 +61,7 @@ def test_npz_and_csv_hold_the_same_numbers_bit_for_bit(
 
 @settings(max_examples=60, deadline=None)
 @given(st.dictionaries(st.text(max_size=12), plain, max_size=4))
+@pytest.mark.slow
 def test_metadata_survive_toml(meta: dict[str, Any]) -> None:
     assert tomllib.loads(toml_text(meta)) == meta
 
@@ -203,3 +205,34 @@ def test_a_name_that_no_format_writes_is_refused_before_the_work(tmp_path: Path)
     check_writable(tmp_path / "a.csv")
     with pytest.raises(InputError, match=r"no format writes files ending in '\.xyz'"):
         check_writable(tmp_path / "a.xyz")
+
+
+@pytest.mark.parametrize("name", ["a.mat", "a.h5", "a.parquet", "a.bag", "a.mcap"])
+def test_a_file_of_another_tool_is_answered_with_the_distribution_that_reads_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fresh_registry: None, name: str
+) -> None:
+    monkeypatch.setenv("SKILLFRAME_PLUGINS", "")
+    (tmp_path / name).write_bytes(b"content")
+    for options in ({}, {"columns": "t,px"}):  # named columns do not make text of it
+        with pytest.raises(InputError, match="skillframe-recordings does, and SKILLFRAME_PLUGINS leaves it out"):
+            read_demonstration(tmp_path / name, **options)
+
+
+def test_folders_foreign_arrays_and_data_sets_are_answered_so_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fresh_registry: None
+) -> None:
+    monkeypatch.setenv("SKILLFRAME_PLUGINS", "")
+    np.savez(tmp_path / "a.npz", t=np.arange(3.0))
+    for ask, words in (
+        (lambda: read_demonstration(tmp_path), "is a folder, and nothing here reads one"),
+        (lambda: read_demonstration(tmp_path / "a.npz", columns="t"), "nothing here reads other arrays"),
+        (lambda: check_writable(tmp_path / "pegs"), "nothing here writes data sets"),
+    ):
+        with pytest.raises(InputError, match=f"{words}; skillframe-recordings does"):
+            ask()
+
+
+def test_what_is_not_installed_is_said_with_the_line_that_installs_it() -> None:
+    said = Registry().absence("reader", "hdf5")
+    assert said.startswith("skillframe-recordings does, and is not installed; type: pip install ")
+    assert Registry().absence("reader", "csv") == Registry().absence("reader", "") == ""

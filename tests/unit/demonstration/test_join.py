@@ -53,7 +53,7 @@ def test_the_clock_that_is_kept_can_be_chosen(write: Write) -> None:
 
 def test_clocks_without_a_common_interval_are_refused_unless_shifted(write: Write) -> None:
     pose, wrench = pose_file(write, np.arange(0.0, 2.0, 0.01)), wrench_file(write, 1e6 * np.arange(3.0, 5.0, 0.01))
-    with pytest.raises(InputError, match=r"wrench\.csv.*no interval in common.*--wrench-units"):
+    with pytest.raises(InputError, match=r"wrench\.csv.*no interval in common.*--set wrench-units"):
         read_demonstration(pose, wrench=wrench)
     demo = read_demonstration(pose, wrench=wrench, wrench_units="us", wrench_shift=-3.0)
     assert demo.wrench[-1, 0] == pytest.approx(1e6 * (demo.time[-1] + 3.0))
@@ -90,7 +90,7 @@ def test_files_of_one_rate_without_clocks_are_paired_from_their_starts(write: Wr
         read_demonstration(pose, wrench=wrench)
     demo = read_demonstration(pose, wrench=wrench, rate=100.0)
     assert len(demo) == 150
-    assert "50 samples that the other file does not cover" in demo.meta["reading"][0]
+    assert "0.5 of the 1.99 s of the pose were left out: the other file lasts no longer" in demo.meta["reading"]
 
 
 def test_a_bad_row_of_the_wrench_file_is_named_in_that_file(write: Write) -> None:

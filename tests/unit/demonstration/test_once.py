@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from skillframe.demonstration.once import KEPT, Once
+from skillframe.demonstration.content_cache import KEPT, Once
 
 
 def counted():

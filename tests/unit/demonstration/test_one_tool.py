@@ -7,16 +7,16 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from skillframe_testkit.checks.examples import example_demonstrations
 
 from skillframe.cli.main import run
-from skillframe.conformance.examples import example_demonstrations
 from skillframe.errors import InputError
 from skillframe.extend.reading import write_demonstration
 from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
 
 pytestmark = pytest.mark.needs_plugins
-KINDS = ["lmc", "replay", "dmp", "gmr", "seds", "search", "spiral", "random_walk", "seat", "dual_arm"]
+KINDS = ["lmc", "replay", "dmp", "gmr", "seds", "search", "seat", "dual_arm"]
 
 
 @pytest.fixture
@@ -65,5 +65,6 @@ def test_segment_refuses_two_tools_and_takes_one(pair: Callable[[float], list[st
 
 
 @pytest.mark.parametrize("kind", ["lmc", "dmp", "gmr", "seds"])
+@pytest.mark.slow
 def test_one_tool_is_learned_from(kind: str, pair: Callable[[float], list[str]], tmp_path: Path) -> None:
     assert run(["learn", *pair(0.0), "--skill", kind, "--out", str(tmp_path / "a.skill.json")]) == 0

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 import yaml
 
-from skillframe.document.export import exported
+from skillframe.document.export import exported, moving_impedance
 from skillframe.document.frame import frame_at
-from skillframe.document.impedance import moving_impedance
 from skillframe.errors import InputError
-from skillframe.extend.exporters import exporter_types
+from skillframe.extend.builtin import skillframe_exporters
 
 PINNED = tomllib.loads((Path(__file__).parent / "declarations.toml").read_text(encoding="utf-8"))
-FORMATS = {each.name: each for each in exporter_types()}
+FORMATS = {each.name: each for each in skillframe_exporters()}
 STOP = {"lead_force_n": 20.0, "lead_torque_nm": 2.0, "time_limit_s": 20.0}
 WHAT = {"bool": bool, "double": float, "float64": float, "string": str, "uint8": int, "int32": int, "uint32": int}
 

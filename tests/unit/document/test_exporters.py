@@ -7,7 +7,7 @@ import pytest
 
 from skillframe.document.export import exported
 from skillframe.errors import InputError
-from skillframe.extend.exporters import exporter_types
+from skillframe.extend.builtin import skillframe_exporters
 from skillframe.extend.records import MovingImpedance
 from skillframe.extend.registry import BadPlugin
 
@@ -15,7 +15,7 @@ PHASE = MovingImpedance(
     axes="base", center=np.zeros(3), twist=np.zeros(6), stiffness=np.eye(6), damping=np.eye(6), lead_force=20.0,
     lead_torque=2.0, stop={"time_limit_s": 5.0},
 )  # fmt: skip
-CRISP = next(each for each in exporter_types() if each.name == "crisp")
+CRISP = next(each for each in skillframe_exporters() if each.name == "crisp")
 
 
 def with_writer(write):
@@ -39,7 +39,7 @@ def test_a_refusal_of_an_exporter_is_its_own_sentence():
 
 
 def test_whatever_else_an_exporter_raises_is_a_sentence_that_names_it():
-    with pytest.raises(BadPlugin, match=r"exporter mine: raised ZeroDivisionError: .*; tell its author"):
+    with pytest.raises(BadPlugin, match=r"exporter mine: raised ZeroDivisionError: .*; report this to its author"):
         exported(with_writer(lambda phase, lines: 1 / 0), PHASE, [])
 
 

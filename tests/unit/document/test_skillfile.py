@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from skillframe_testkit.checks.examples import example_demonstrations
+from skillframe_testkit.suites import HoldSkill
 
 from skillframe import __version__
-from skillframe.conformance.examples import example_demonstrations
 from skillframe.document import file as skillfile
 from skillframe.errors import InputError, UnknownName
 from skillframe.extend.records import Document, SkillType
 from skillframe.extend.registry import Plugin, load_registry
-from skillframe.testing import HoldSkill
 
 FRAME = {"work_at": [0.0, 0.0, -0.2], "learned_at": [0.0, 0.0, 0.0], "center_of_compliance": [0.0, 0.0, 0.0]}
 

@@ -1,11 +1,10 @@
 import pytest
+from skillframe_testkit.suites import HoldSkill, example_demonstrations
 
-from skillframe.document.file import save
-from skillframe.document.source import SkillSource, learned, load_skill, parse_source
+from skillframe.document.file import SkillSource, learned, load_skill, parse_source, save
 from skillframe.errors import InputError, UnknownName
 from skillframe.extend.reading import write_demonstration
 from skillframe.extend.records import LearnOptions, SkillType
-from skillframe.testing import HoldSkill, example_demonstrations
 
 
 @pytest.fixture

@@ -5,20 +5,20 @@ from functools import cache
 
 import numpy as np
 import pytest
+from skillframe_testkit.suites import HoldSkill, ScriptedSkill
+from skillframe_worlds import peg_in_hole
 
 from skillframe.errors import SkillframeError, UnknownName
-from skillframe.execution.arms import FirstArm, simulate_arms
+from skillframe.execution.drives.arms import FirstArm, simulate_arms
 from skillframe.execution.executor import Setup, simulate
 from skillframe.execution.prepare import load_robot_model
 from skillframe.frames import Pose, matrix_from_quaternion, norm, rotation_matrix, rotation_vector
 from skillframe.robot.kinematics import at
 from skillframe.skill import Command, Impedance, Skill, Status, no_reasons
-from skillframe.testing import HoldSkill, ScriptedSkill
 from skillframe.world.placement import fixture_poses, start_configurations
 from skillframe.world.plant import Plant
+from skillframe.world.quantities import SensorSettings
 from skillframe.world.scene import Holder
-from skillframe.world.sensors import SensorSettings
-from skillframe.world.worlds import peg_in_hole
 
 QUIET = SensorSettings(
     force_noise=0.0, torque_noise=0.0, force_bias=0.0, torque_bias=0.0, position_noise=0.0, rotation_noise=0.0
@@ -74,6 +74,7 @@ def test_a_coordinator_sees_a_row_for_every_arm():
     assert seen.twist.shape == seen.wrench.shape == (3, 2, 6)
 
 
+@pytest.mark.slow
 def test_trials_are_bit_identical_in_any_company():
     draws = {"start.tilt_y": np.array([0.1, -0.05, 0.02]), "robot.joint_friction": np.array([0.0, 0.3, 0.5])}
     noisy = setup(sensors=SensorSettings())

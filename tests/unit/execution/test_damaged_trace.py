@@ -84,6 +84,7 @@ def test_a_whole_number_beyond_every_float_is_read_as_infinity(read: Callable[..
     assert read(meta=json.dumps({**META, "final_error_m": 10**400})).meta["final_error_m"] == np.inf
 
 
+@pytest.mark.needs_plugins
 def test_a_damaged_trace_is_an_input_error_of_report_and_leaves_no_page(
     read: Callable[..., Trace], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -5,15 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from skillframe_testkit.suites import HoldSkill
 
 import skillframe
-from skillframe.control.endings import Broken, Ended
 from skillframe.execution.drive import Shares
 from skillframe.execution.executor import Loop, simulate
 from skillframe.execution.recorder import Recorder
 from skillframe.frames import Pose
-from skillframe.skill import Observation
-from skillframe.testing import HoldSkill
+from skillframe.skill import Broken, Ended, Observation
 from skillframe.world.placement import fixture_poses, start_configurations
 from skillframe.world.plant import Plant
 from tests.laws.pushing import Push, impedance
@@ -143,9 +142,7 @@ def test_no_class_inherits_from_the_loop_and_it_imports_no_arm_and_no_oil():
     assert {m for m in taken if m.startswith("skillframe.execution.drives")} == {"skillframe.execution.drives.choose"}
     rooms = {m.split(".")[1] for m in taken if m.startswith("skillframe.")}
     assert not rooms & {"machine", "cosim", "fmu", "robot", "signals"}
-    assert {m for m in taken if m.startswith("skillframe.control")} == {
-        "skillframe.control.contact", "skillframe.control.endings"
-    }  # fmt: skip
+    assert {m for m in taken if m.startswith("skillframe.control")} == {"skillframe.control.contact"}
 
 
 def test_simulate_hands_sensors_and_skill_generators_of_their_own():
@@ -156,7 +153,7 @@ def test_simulate_hands_sensors_and_skill_generators_of_their_own():
             super().start(observation, rngs)
             self.drawn = [rng.standard_normal(100) for rng in rngs]
 
-    from skillframe.world.sensors import SensorSettings
+    from skillframe.world.quantities import SensorSettings
 
     setting = setup(sensors=SensorSettings())
     plain, drawing = (

@@ -5,14 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 import pytest
+from skillframe_testkit.suites import HoldSkill
 
 from skillframe.errors import InputError
 from skillframe.execution.executor import begin
 from skillframe.frames import norm
-from skillframe.robot.joint_settings import Encoders
 from skillframe.robot.spec import Limits, load_robot
-from skillframe.signals.delay import CommandDelay
-from skillframe.testing import HoldSkill
+from skillframe.robot.tables import Encoders
+from skillframe.signals import CommandDelay
 from skillframe.world.scene import Holder
 from tests.laws.pushing import Hold, Push, impedance
 from tests.laws.runs import generators, robot, run, setup
@@ -182,9 +182,9 @@ def test_encoders_and_delays_that_cannot_be_are_refused(tmp_path, toml, sentence
 
 @pytest.mark.parametrize(
     ("toml", "sentence"),
-    [("[encoders]\nbits = 17", r"encoders are in \[sensors\]"), ("delay_s = 0.002", "delay is the quantity actuator")],
+    [("[encoders]\nbits = 17", "encoders: its drive has"), ("delay_s = 0.002", r"control\.delay_s: its drive has")],
 )
-def test_a_hydraulic_machine_has_encoders_and_delays_of_its_own(tmp_path, toml, sentence):
+def test_a_robot_whose_drive_has_its_own_control_law_takes_no_encoders_and_delays(tmp_path, toml, sentence):
     folder = load_robot("hiab_xs031").folder
     text = (folder / "robot.toml").read_text(encoding="utf-8")
     text = text.replace("[control]\n", f"[control]\n{toml}\n") if "delay" in toml else f"{text}\n{toml}\n"

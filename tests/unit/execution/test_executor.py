@@ -4,7 +4,7 @@ import pytest
 from skillframe.errors import SkillframeError, UnknownName
 from skillframe.frames import matrix_from_quaternion, norm, rotation_vector
 from skillframe.skill import Status
-from skillframe.world.sensors import SensorSettings
+from skillframe.world.quantities import SensorSettings
 from tests.laws.pushing import Hold, Push, impedance
 from tests.laws.runs import run, setup
 

@@ -106,7 +106,7 @@ def test_a_free_flying_tool_has_no_joint_torque_to_limit():
 
 
 @pytest.mark.parametrize(
-    ("push", "text"), [(1e4, "the tool moves at"), (1e9, "the law asks for"), (np.nan, "not a finite")]
+    ("push", "text"), [(1e4, "the tool moves at"), (1e9, "the controller commands"), (np.nan, "not a finite")]
 )
 def test_a_diverging_run_is_stopped_with_the_cause_and_its_trace(push, text):
     def wild():

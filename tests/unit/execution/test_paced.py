@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from skillframe.execution.paced import PacedSkill
+from skillframe.execution.drive import PacedSkill
 from skillframe.frames import Pose
 from skillframe.skill import Command, Impedance, Observation, Skill, no_reasons
 

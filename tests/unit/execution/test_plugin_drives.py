@@ -1,18 +1,20 @@
 """A drive that a plug-in brings, named in robot.toml, drives the robot in a run and in a recording."""
 
 import shutil
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from skillframe_testkit.suites import HoldSkill
 
 from skillframe.cli.main import run
 from skillframe.errors import InputError
-from skillframe.execution.drives import choose
+from skillframe.execution.drives import torque
 from skillframe.execution.executor import Setup, simulate
-from skillframe.execution.prepare import drive_maker, load_robot_model, load_world
+from skillframe.execution.prepare import load_robot_model, load_world
+from skillframe.extend.drives import drive_of
 from skillframe.extend.registry import registry
 from skillframe.robot.spec import robot_folder
-from skillframe.testing import HoldSkill
 
 CODE = """
 from skillframe import hookimpl
@@ -48,11 +50,10 @@ def robot(tmp_path, install):
 
 def test_the_drive_of_a_plugin_gives_the_same_run_as_the_one_that_it_wraps(robot):
     def held(model):
-        setup = Setup(robot=model, scene=load_world("free", {}), make_drive=drive_maker(model))
+        setup = Setup(robot=model, scene=load_world("free", {}))
         return simulate(HoldSkill(duration=0.05), setup, {}, [np.random.default_rng(0)], trace_hz=1000.0)
 
     own, other = held(load_robot_model("panda")), held(load_robot_model(str(robot)))
-    assert drive_maker(load_robot_model("panda")) is None and drive_maker(load_robot_model(str(robot))) is not None
     np.testing.assert_array_equal(own.traces[0].position, other.traces[0].position)
 
 
@@ -63,15 +64,22 @@ def test_an_unknown_drive_is_named_when_the_robot_is_loaded(robot):
         load_robot_model(str(robot))
 
 
-def test_a_set_up_without_the_maker_of_a_plugin_s_drive_is_refused(robot):
-    setup = Setup(robot=load_robot_model(str(robot)), scene=load_world("free", {}))
-    with pytest.raises(InputError, match="'bus' is a plug-in's; hand its `make` to the set-up"):
-        simulate(HoldSkill(duration=0.05), setup, {}, [np.random.default_rng(0)])
+def test_a_robot_that_names_none_of_two_drives_for_its_actuators_is_refused(install, tmp_path):
+    for name in ("one", "other"):
+        install(f"{name}_plugin", CODE.replace('name="bus"', f'name="{name}", actuated=True'))
+    registry.cache_clear()
+    with pytest.raises(InputError, match=r"drive\.kind: is not given, and one and other take \[\[actuation\]\]"):
+        drive_of(SimpleNamespace(own_law=True, drive=None, folder=tmp_path))
+    registry.cache_clear()
 
 
+@pytest.mark.needs_plugins
+@pytest.mark.slow
 def test_a_recording_is_driven_by_it(robot, tmp_path, capsys, monkeypatch):
-    made, own = [], choose._foreign
-    monkeypatch.setattr(choose, "_foreign", lambda *given: made.append(1) or own(*given))
-    words = ["demonstration", "record", "--world", "free", "--robot", str(robot), "--out", str(tmp_path / "demo.npz")]
+    monkeypatch.setenv("SKILLFRAME_PLUGINS", "worlds,teaching,bus_plugin")
+    registry.cache_clear()
+    made, own = [], torque.OneArm
+    monkeypatch.setattr(torque, "OneArm", lambda *given: made.append(1) or own(*given))
+    words = ["record", "--world", "free", "--robot", str(robot), "--out", str(tmp_path / "demo.npz")]
     assert run(words) == 0, capsys.readouterr().err
     assert made

@@ -7,21 +7,20 @@ from functools import cache
 
 import numpy as np
 import pytest
+from skillframe_reports.plots import run_plots
+from skillframe_testkit.suites import HoldSkill
 
 from skillframe.cosim.coupling import StepTooLarge
 from skillframe.cosim.servos import Servos, servos
 from skillframe.errors import InputError, SkillframeError, UnknownName
+from skillframe.execution.drives.servo_plots import servo_plots
 from skillframe.execution.executor import Setup, begin, simulate
 from skillframe.execution.prepare import load_robot_model
-from skillframe.fmu.library import fmu_folders
-from skillframe.machine.checks.audit import audit
-from skillframe.reports.machine import machine_plots
-from skillframe.reports.plots import run_plots
+from skillframe.extend.drives import audit
+from skillframe.fmu.build import fmu_folders
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot, robot_names
-from skillframe.testing import HoldSkill
-from skillframe.world.quantities import RANGES
-from skillframe.world.sensors import SensorSettings
+from skillframe.world.quantities import SensorSettings
 from tests.fmu_cache import compiler, own_cache  # noqa: F401
 from tests.laws.pushing import FORCE_CAP, Push
 from tests.laws.runs import SILENT, generators, scene
@@ -145,10 +144,9 @@ def test_the_law_reads_the_motors_speeds_and_knows_their_rotors():
 
 def test_a_report_shows_torques_and_motors_and_calls_the_force_measured(runs):
     trace = runs["panda_servo"]
-    titles = ["".join(map(str, plot)) if isinstance(plot, list) else str(plot) for plot in machine_plots(trace)]
-    assert len(titles) == 2 and "Joint torques" in titles[0] and "Motors" in titles[1]
-    assert len(run_plots(trace)) == 4  # with torque and attitude, which a hydraulic machine does not have
-    assert not machine_plots(replace(trace, machine={"thrust": np.zeros((len(trace.time), 2))}))  # another's columns
+    assert [plot.title for plot in servo_plots(trace)] == ["Joint torques", "Motors"]
+    assert len(run_plots(trace)) == 4  # with torque and attitude, which an estimated force does not show
+    assert not servo_plots(replace(trace, machine={"thrust": np.zeros((len(trace.time), 2))}))  # another's columns
 
 
 def test_friction_that_is_drawn_reaches_the_servos():
@@ -192,7 +190,7 @@ def test_what_is_left_alone_must_be_there():
     spec = changed(unused=("targt",))
     with pytest.raises(UnknownName, match=r"did you mean 'target'\?"):
         begin(HoldSkill(), setup(load_model(spec)), {}, generators(1))
-    assert [p.code for p in audit(spec).problems] == ["cannot_run"]
+    assert [p.code for p in audit(spec).problems] == ["cannot_run"] and not audit(spec).usable
 
 
 MOTION = {"position": "position", "velocity": "velocity", "acceleration": "acceleration"}
@@ -201,9 +199,12 @@ MOTION = {"position": "position", "velocity": "velocity", "acceleration": "accel
 @pytest.mark.parametrize(
     ("values", "sentence"),
     [
-        ({"inputs": MOTION}, r"the servo on joint1 is told nothing: its inputs map neither torque nor target"),
-        ({"inputs": {**MOTION, "torque": "torque", "target": "target"}}, "is told a torque and a target; map one"),
-        ({"inputs": {**MOTION, "command": "torque"}}, "told nothing"),
+        ({"inputs": MOTION}, r"the servo on joint1 has no command: its inputs map neither torque nor target"),
+        (
+            {"inputs": {**MOTION, "torque": "torque", "target": "target"}},
+            "has two commands, torque and target; map one",
+        ),
+        ({"inputs": {**MOTION, "command": "torque"}}, "has no command"),
         ({"inputs": {**MOTION, "target": "target"}}, r"its position_gain \[N m/rad\] is not known; add it"),
         ({"nominal": {"stiffness": 0.0}}, r"stiffness of the servo on joint1 is 0\.0; it must be greater than zero"),
         (
@@ -231,14 +232,8 @@ def test_a_spring_too_stiff_for_the_control_rate_is_refused():
         begin(HoldSkill(), setup(load_model(spec)), {}, generators(1))
 
 
-@pytest.mark.parametrize("key", ["actuator.deadband", "actuator.supply_pressure", "robot.nominal_payload"])
-def test_quantities_of_valves_are_refused(key):
-    with pytest.raises(InputError, match="is driven by servos, which have no such quantity"):
-        begin(HoldSkill(), setup("panda_servo"), {key: np.array([0.01])}, generators(1))
-
-
 def test_a_servo_that_refuses_its_figures_says_which(monkeypatch):
-    monkeypatch.setitem(RANGES, "actuator.friction_scale", None)
+    monkeypatch.setattr("skillframe.extend.drives.require_within", lambda *known: None)
     draws = {"actuator.friction_scale": np.array([-1.0])}
     with pytest.raises(SkillframeError, match=r"joint1 .*parameter viscous_friction is -2; it must be zero or more"):
         begin(HoldSkill(), setup("panda_servo"), draws, generators(1))
@@ -274,17 +269,11 @@ def written(tmp_path, text):
     return folder / "robot.toml"
 
 
-def test_without_a_kind_actuators_are_cylinders_and_what_they_lack_names_the_cure(tmp_path):
-    text = (robot_names()["panda_servo"] / "robot.toml").read_text().replace('[drive]\nkind = "servo"\n', "")
-    with pytest.raises(SkillframeError, match=r'write \[drive\] kind = "servo" if it is a servo'):
-        load_robot_model(str(written(tmp_path, text)))
-
-
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
         ('kind = "servo"', 'kind = "servos"', r"drive\.kind: unknown drive 'servos'; did you mean 'servo'"),
-        ("[drive]", "[gains]\nbody = 2.0\n[drive]", r"\[sensors\] and \[gains\] .* its actuators are servos"),
+        ("[drive]", "[gains]\nbody = 2.0\n[drive]", "unknown key 'gains'"),
         ("[drive]", '[[loop]]\nframe_a = "a"\nframe_b = "b"\n[drive]', "servos drive one open arm"),
     ],
 )

@@ -4,13 +4,12 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from skillframe.document.export import exported
-from skillframe.document.impedance import moving_impedance, per_axis
+from skillframe.document.export import exported, moving_impedance, per_axis
 from skillframe.errors import InputError
-from skillframe.extend.exporters import exporter_types
+from skillframe.extend.builtin import skillframe_exporters
 from skillframe.frames import rotation_matrix, unit
 
-FORMATS = {each.name: each for each in exporter_types()}
+FORMATS = {each.name: each for each in skillframe_exporters()}
 STOP = {"lead_force_n": 20.0, "lead_torque_nm": 2.0, "time_limit_s": 20.0}
 POINT = [0.0, 0.0, 0.2]
 
@@ -91,7 +90,7 @@ def test_crisp_is_told_the_gains_and_clips_the_error_to_the_lead():
 
 
 def test_a_controller_in_tool_axes_needs_the_attitude_and_then_gets_them():
-    with pytest.raises(InputError, match="give the tool's attitude"):
+    with pytest.raises(InputError, match="give the tool's orientation"):
         moving_impedance(peg(), None, "tool", None, "peg")
     quarter = rotation_matrix(np.array([0.0, 0.0, np.pi / 2]))  # the tool's y lies along -x of base
     phase = moving_impedance(peg(), None, "tool", quarter, "peg")

@@ -144,6 +144,7 @@ def test_finding_a_command_imports_nothing_and_what_it_prints_while_loading_is_n
     ("text", "place", "problem"),
     [("import nothing_of_that_name", "command", "cannot be loaded (ModuleNotFoundError: No module named"),
      ("raise SystemExit(7)", "command", "cannot be loaded (SystemExit: 7)"),
+     ("raise KeyboardInterrupt", "command", "cannot be loaded (KeyboardInterrupt: )"),
      ("command = 5", "command", "is 5 at toy_bad:command, which is no click command"),
      (GOOD, "comand", "cannot be loaded (AttributeError")],
 )  # fmt: skip
@@ -185,17 +186,21 @@ def test_plugins_that_are_left_out_take_their_commands_along(install, capsys, mo
     assert run(["hello", "you"]) == 1
 
 
-def test_the_command_of_a_plugin_that_is_not_installed_is_answered_with_what_to_type(install, capsys):
-    assert run(["reproduce", "--quick"]) == 2
+@pytest.mark.parametrize(
+    ("words", "home"),
+    [(["reproduce", "--quick"], "papers"), (["certify", "run", "peg.toml"], "certify"), (["compare", "x"], "certify")],
+)
+def test_the_command_of_a_plugin_that_is_not_installed_is_answered_with_what_to_type(install, capsys, words, home):
+    assert run(words) == 2
     said = capsys.readouterr().err
-    assert said.startswith("error: reproduce is in skillframe-papers, which is not installed; type: pip install ")
-    assert run(["--help"]) == 0 and "reproduce" not in capsys.readouterr().out
+    assert said.startswith(f"error: {words[0]} is in skillframe-{home}, which is not installed; type: pip install ")
+    assert run(["--help"]) == 0 and f"  {words[0]}" not in capsys.readouterr().out
 
 
 def test_a_listing_names_the_commands_of_a_plugin_and_a_name_that_the_core_has(install, capsys, monkeypatch):
     install("toy-hello", GOOD, "hello", "run", plugins=["toy"])
     monkeypatch.setenv("SKILLFRAME_PLUGINS", "toy")
-    assert run(["plugins", "list", "--json"]) == 0
+    assert run(["plugins", "--json"]) == 0
     (row,) = [row for row in json.loads(capsys.readouterr().out) if row["name"] == "toy"]
     assert row["provides"] == ["command:hello", "command:run"]
     assert row["error"] == "the command run is in skillframe, too"

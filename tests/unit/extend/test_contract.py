@@ -73,7 +73,7 @@ def test_versions_are_compared_as_numbers_not_as_text():
 )
 def test_a_distribution_that_asks_for_another_skillframe_says_which(requires, asked):
     text = requirement_problem(requires, __version__)
-    assert text == f"it asks for {asked}, and {__version__} is installed; install versions that fit"
+    assert text == f"it requires {asked}, and {__version__} is installed; install versions that fit"
 
 
 @pytest.mark.parametrize(
@@ -98,4 +98,4 @@ def test_a_requirement_that_nobody_can_read_is_said():
 def test_a_wheel_that_needs_a_newer_core_is_not_even_imported(install):
     metadata = "Metadata-Version: 2.1\nName: dist-one\nVersion: 1.0\nRequires-Dist: skillframe>=9.0\n"
     install("one", "raise RuntimeError('imported')", metadata=metadata)
-    assert plugin(load_registry()).error.startswith("it asks for skillframe>=9.0, and ")
+    assert plugin(load_registry()).error.startswith("it requires skillframe>=9.0, and ")

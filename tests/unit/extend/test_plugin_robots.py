@@ -33,7 +33,7 @@ def robot(tmp_path, install, fresh_registry):
 def test_a_robot_of_a_plugin_is_loaded_listed_and_completed_by_its_name(robot, capsys):
     assert load_robot("flier").folder == robot
     assert robot_names()["flier"] == robot
-    assert run(["robots", "list", "--json"]) == 0
+    assert run(["robots", "--json"]) == 0
     rows = {row["name"]: row for row in json.loads(capsys.readouterr().out)}
     assert rows["flier"]["path"] == str(robot) and rows["flier"]["error"] is None
     assert rows["panda"]["error"] is None
@@ -72,7 +72,7 @@ def test_two_plugins_with_one_robot_are_refused_by_name(robot, install, tmp_path
 def test_a_shipped_robot_stays_what_it_is_where_a_plugin_takes_its_name(robot, install, capsys):
     install("two", CODE.format(name="panda", folder=str(robot)))
     assert load_robot("panda").folder != robot
-    assert run(["plugins", "list"]) == 0
+    assert run(["plugins"]) == 0
     assert "robot 'panda' is provided by both skillframe" in capsys.readouterr().out
 
 

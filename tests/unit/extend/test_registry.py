@@ -1,6 +1,7 @@
 """Plug-ins are made as distributions on disk and put on the path, so that discovery is the real one."""
 
 import os
+import signal
 import subprocess
 import sys
 import textwrap
@@ -8,8 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from skillframe.errors import InputError, UnknownName
+from skillframe.errors import UnknownName
 from skillframe.extend.registry import KINDS, RECORDS, PluginConflict, load_registry
+from tests.unit.demonstration.conftest import make
 
 GOOD = """
 from skillframe import hookimpl
@@ -40,6 +42,8 @@ BROKEN = {
     "fails to import": ("import no_such_module", "ModuleNotFoundError: No module named 'no_such_module'"),
     "does not parse": ("def (", "SyntaxError"),
     "leaves on import": ("raise SystemExit('bye')", "SystemExit: bye"),
+    "interrupts on import": ("raise KeyboardInterrupt('now')", "KeyboardInterrupt: now"),
+    "interrupts in a hook": (HOOK + "raise KeyboardInterrupt\n    yield", "KeyboardInterrupt: "),
     "raises in a hook": (
         HOOK + "raise ZeroDivisionError('oh')\n    yield",
         "ZeroDivisionError: oh",
@@ -98,6 +102,14 @@ def test_a_broken_plugin_is_named_with_its_error_and_the_rest_works(install, how
     assert error in bad.error
     assert registry.skill("turn").name == "turn"
     assert plugin(registry, "core").provides == plugin(load_registry(), "core").provides
+
+
+def test_ctrl_c_of_a_person_while_a_plugin_loads_is_no_error_of_the_plugin(install):
+    install("slow", "import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nimport time\ntime.sleep(5)")
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        load_registry()
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_asking_for_a_skill_of_a_broken_plugin_tells_what_failed(install):
@@ -181,7 +193,7 @@ def test_a_selected_plugin_that_is_not_installed_is_told(monkeypatch):
     monkeypatch.setenv("SKILLFRAME_PLUGINS", "lcm")
     registry = load_registry()
     assert registry.not_installed == ["lcm"]
-    with pytest.raises(UnknownName, match="asks for lcm, which is not installed"):
+    with pytest.raises(UnknownName, match="names lcm, which is not installed"):
         registry.skill("lmc")
 
 
@@ -245,10 +257,19 @@ def test_a_plugin_installed_with_pip_is_found_and_leaves_when_uninstalled(tmp_pa
     assert "UnknownName" in gone.stderr
 
 
-def test_a_part_that_is_named_as_a_world_says_how_it_becomes_one():
-    known = load_registry()
-    for name in ("plug.stl", "folder/PLUG.STEP", "scene.xml"):
-        with pytest.raises(InputError, match="is a part, not a world; make one of two parts, skillframe worlds new"):
-            known.world(name)
-    with pytest.raises(UnknownName):
-        known.world("peg.in.hole")
+AUDIT = """
+from skillframe import hookimpl
+from skillframe.extend.records import AuditType
+
+@hookimpl
+def skillframe_audits():
+    yield AuditType(name="count", summary="how many", warnings=lambda found: [f"{each.source}: odd" for each in found])
+"""
+
+
+def test_what_an_audit_says_is_a_warning_of_what_learns(install, fresh_registry):
+    from skillframe.api.learning import suspicions
+
+    install("one", AUDIT)
+    demonstration = make()
+    assert suspicions([demonstration, demonstration]) == [": odd", ": odd"]

@@ -7,8 +7,8 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from skillframe.fmu.build import find_fmu
 from skillframe.fmu.inspection import inspect_fmu
-from skillframe.fmu.library import find_fmu
 from tests import fmu_cache
 
 compiler, own_cache = fmu_cache.compiler, fmu_cache.own_cache
@@ -28,10 +28,11 @@ def cylinder2(own_cache, compiler):
 @pytest.fixture
 def reference():
     """Makes a bank of the Python reference with one cylinder per parameter set, at mid stroke."""
+    from skillframe_hydraulics.cylinder.reference import ReferenceBank
+
     from skillframe.fmu.actuator import ActuatorSpec
-    from skillframe.fmu.library import fmu_folders
+    from skillframe.fmu.build import fmu_folders
     from skillframe.fmu.table import read_table
-    from skillframe.machine.cylinder.reference import ReferenceBank
 
     def make(sets):
         table = read_table(fmu_folders()["hydraulic_cylinder"])

@@ -9,12 +9,9 @@ from fmpy.validation import validate_fmu
 from fmu_fakes import make
 
 from skillframe.errors import InputError, MissingDependency, UnknownName
-from skillframe.fmu.build import build_fmu, common_folder
-from skillframe.fmu.describe import variables_header
+from skillframe.fmu.build import build_fmu, build_named, built, common_folder, find_compiler, find_fmu, fmu_folders
 from skillframe.fmu.inspection import inspect_fmu
-from skillframe.fmu.library import build_named, built, find_fmu, fmu_folders
-from skillframe.fmu.table import read_table
-from skillframe.fmu.toolchain import find_compiler
+from skillframe.fmu.table import read_table, variables_header
 
 pytestmark = pytest.mark.usefixtures("compiler")
 
@@ -24,6 +21,7 @@ def test_fmpy_validate_finds_nothing_in_our_fmus(cylinder):
 
 
 @pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.slow
 def test_two_builds_are_the_same_file_to_the_bit(tmp_path, version):
     folder = fmu_folders()["hydraulic_cylinder"]
     first, second = build_fmu(folder, version), build_fmu(folder, version, out=tmp_path / "f.fmu")
@@ -99,6 +97,7 @@ def test_without_a_compiler_building_says_what_to_type(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.slow
 def test_a_users_own_fmu_takes_a_table_and_one_c_file(tmp_path, version):
     path = make(tmp_path, "good", version)
     assert validate_fmu(str(path)) == []

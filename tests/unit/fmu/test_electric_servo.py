@@ -8,7 +8,7 @@ from scipy.linalg import expm
 from skillframe.cosim import CosimSettings, Master, Motion
 from skillframe.errors import SkillframeError
 from skillframe.fmu.actuator import ActuatorSpec
-from skillframe.fmu.library import find_fmu
+from skillframe.fmu.build import find_fmu
 from skillframe.fmu.opening import open_actuators
 
 pytestmark = pytest.mark.usefixtures("own_cache", "compiler")
@@ -160,7 +160,14 @@ def whole(wall, friction, seconds):
     return np.array(found)
 
 
-@pytest.mark.parametrize(("wall", "friction"), [(0.0, 0.0), (0.0, 1.0), (2e4, 1.0)], ids=["free", "rough", "contact"])
+@pytest.mark.parametrize(
+    ("wall", "friction"),
+    [
+        pytest.param(0.0, 0.0, id="free", marks=pytest.mark.slow),
+        pytest.param(0.0, 1.0, id="rough", marks=pytest.mark.slow),
+        pytest.param(2e4, 1.0, id="contact"),
+    ],
+)
 def test_coupled_to_an_inertia_it_follows_one_system_with_the_order_of_the_coupling(wall, friction):
     """The error falls with the square of the step: by 16 in two halvings, 9 at least where a wall is met on the way."""
     seconds = 0.1 if wall else 0.06

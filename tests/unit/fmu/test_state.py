@@ -9,7 +9,7 @@ from fmu_fakes import Swing, bank
 from skillframe.fmu.bindings import Instance, InstanceFailed
 
 H = 1e-3
-EVERYTHING = {"deadband": 0.05, "hysteresis": 0.02, "air_fraction": 0.01, "static_friction": 6e3, "pump_flow": 5e-4}
+EVERYTHING = {"deadband": 0.05, "hysteresis": 0.02, "air_fraction": 0.01, "static_friction": 6e3}
 
 
 def drive(b, swing, first, last, seed=3):

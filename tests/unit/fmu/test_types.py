@@ -9,11 +9,10 @@ from fmu_fakes import make, repacked
 
 from skillframe.errors import InputError
 from skillframe.fmu.actuator import ActuatorSpec
-from skillframe.fmu.build import common_folder
+from skillframe.fmu.build import common_folder, compile_library
 from skillframe.fmu.inspection import inspect_fmu
 from skillframe.fmu.opening import open_actuators
-from skillframe.fmu.record import simulate_to_csv
-from skillframe.fmu.toolchain import compile_library
+from skillframe.fmu.simulate import simulate_to_csv
 
 pytestmark = pytest.mark.usefixtures("compiler")
 VARIABLES = """

@@ -5,11 +5,10 @@ import tomllib
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, assume, given, settings
+from hypothesis import HealthCheck, assume, example, given, settings
 from hypothesis import strategies as st
 
-from skillframe.robot.audit import audit
-from skillframe.robot.mass_matrix import SINGULAR, pivot_ratios
+from skillframe.robot.audit import SINGULAR, audit, pivot_ratios
 from skillframe.robot.spec import load_robot
 
 ALL_KINDS = ("revolute", "prismatic", "continuous", "planar", "floating", "fixed")
@@ -45,6 +44,7 @@ def box_inertia(mass, moments):
 
 @hypothesis_settings
 @given(seed=st.integers(0, 10**6), size=st.integers(1, 12), power=st.integers(-1, 3), free=st.booleans())
+@pytest.mark.slow
 def test_an_honest_tree_is_usable_at_every_scale_and_base(save, urdf, seed, size, power, free):
     """From centimetres to a kilometre. Travels are metres at every scale, and at their ends a tree of millimetres is
     singular to rounding: each sliding or floating joint makes the lever (3 m / 0.3 mm)^2 = 1e8 of what turns before
@@ -164,9 +164,11 @@ def test_a_leaf_of_unknown_size_is_measured_against_the_largest_link(save, urdf)
 
 
 @hypothesis_settings
+@example(seed=134, size=8, harm="negative")  # masses cancel to almost nothing
 @given(
     seed=st.integers(0, 10**6), size=st.integers(2, 8), harm=st.sampled_from(["strip", "identity", "negative", "flat"])
 )
+@pytest.mark.slow
 def test_the_overlay_that_a_problem_prints_cures_it(save, urdf, seed, size, harm):
     text = spoil(urdf.tree(seed, size, 1.0, ALL_KINDS), harm)
     overlay: dict[str, object] = {}

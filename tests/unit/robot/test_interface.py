@@ -7,8 +7,8 @@ import shutil
 import pytest
 
 from skillframe.errors import SkillframeError
-from skillframe.machine.checks.audit import audit
-from skillframe.paths import data_dirs
+from skillframe.extend.drives import audit
+from skillframe.files import data_dirs
 from skillframe.robot.describe import describe
 from skillframe.robot.interface import LEVER, TAUGHT_SPEED, Control
 from skillframe.robot.model import load_model
@@ -132,14 +132,14 @@ def test_check_and_show_tell_delay_damping_speed_and_slow_down(robot):
     )
     assert told in describe(load_model(spec))
     assert spec.control.admittance.told() == told
-    assert run(["robots", "check", str(spec.folder)]) == 0
+    assert run(["robots", "--check", str(spec.folder)]) == 0
 
 
 def test_scripts_get_the_figures(robot, capsys):
     from skillframe.cli.main import run
 
     folder = str(robot(POSITION).folder)
-    for command in ("check", "show"):
-        assert run(["robots", command, folder, "--json"]) == 0
+    for words in (["--check"], []):
+        assert run(["robots", *words, folder, "--json"]) == 0
         figures = json.loads(capsys.readouterr().out)["interface"]
         assert figures["takes"] == "position" and figures["slow_down"] == pytest.approx(2.744, abs=1e-3)

@@ -137,6 +137,7 @@ def _narrowed(panda, name, upper):
 
 
 @pytest.mark.parametrize("upper", [-1.8, -2.1, -2.4])
+@pytest.mark.slow
 def test_a_joint_named_in_a_refusal_stands_at_its_limit_and_that_limit_is_what_holds_the_arm(panda, upper):
     name = "joint4"  # the elbow alone decides how far the arm reaches; every other joint has a way round
     pose = Pose(np.array([0.7, 0.0, 0.45]), DOWN)  # the whole arm reaches it

@@ -5,8 +5,9 @@ import pinocchio as pin
 import pytest
 
 from skillframe.errors import InputError, UnknownName
-from skillframe.robot.model import attach_payload, load_model
+from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot
+from tests.references import attach_payload
 
 
 def load(path):

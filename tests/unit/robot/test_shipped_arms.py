@@ -8,7 +8,7 @@ import pinocchio as pin
 import pytest
 
 from skillframe.errors import InputError, UnknownName
-from skillframe.machine.checks.audit import audit
+from skillframe.extend.drives import audit
 from skillframe.robot.kinematics import at, random_configuration
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot, robot_names
@@ -225,5 +225,5 @@ def test_a_motor_s_inertia_that_cannot_be_is_refused(with_motors, lines, error, 
 def test_every_arm_that_ships_is_tested_here():
     """Those with a URDF of their own; others are the same arm with encoders, servos or another interface."""
     specs = {name: load_robot(name) for name in robot_names()}
-    arms = {n for n, s in specs.items() if s.base == "fixed" and len(s.arm) == 1 and not s.hydraulic}
+    arms = {n for n, s in specs.items() if s.base == "fixed" and len(s.arm) == 1 and not s.own_law}
     assert {name for name in arms if specs[name].urdf.resolve().parent.name == name} == set(ARMS)

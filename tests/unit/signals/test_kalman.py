@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from scipy.linalg import solve_discrete_are
 
 from skillframe.errors import SkillframeError
-from skillframe.signals import kalman
-from skillframe.signals.kalman import WrenchFilter, WrenchModel, process_noise, steady_gain, transition
+from skillframe.signals import WrenchFilter, WrenchModel, process_noise, steady_gain, transition
 
 NOISE = np.repeat([0.3, 0.02], 3)
 
@@ -136,8 +135,8 @@ def test_long_recordings_are_smoothed_in_chunks_without_a_seam(monkeypatch: pyte
     time = np.arange(900) * 1e-3
     wrench = np.cumsum(rng.normal(size=(900, 6)), axis=0)
     whole = WrenchFilter().smooth(time, wrench)
-    monkeypatch.setattr(kalman, "CHUNK", 300)
-    monkeypatch.setattr(kalman, "OVERLAP", 250)
+    monkeypatch.setattr("skillframe.signals.CHUNK", 300)
+    monkeypatch.setattr("skillframe.signals.OVERLAP", 250)
     # 1e-5: at 25 Hz and 1 kHz the memory fades by e^-27 over 250 samples, times the slope's large prior variance
     assert np.abs(WrenchFilter().smooth(time, wrench) - whole).max() < 1e-5
 
@@ -150,7 +149,7 @@ def test_noise_figures_must_be_six_positive_numbers(noise: np.ndarray) -> None:
 
 def test_the_loop_needs_neither_filterpy_nor_scipy() -> None:
     code = (
-        "import sys, numpy as np; from skillframe.signals.kalman import WrenchFilter; f = WrenchFilter().steady();"
+        "import sys, numpy as np; from skillframe.signals import WrenchFilter; f = WrenchFilter().steady();"
         "f.start(np.zeros((1, 6))); f.step(np.ones((1, 6)));"
         "sys.exit(any(m in sys.modules for m in ('filterpy', 'scipy')))"
     )

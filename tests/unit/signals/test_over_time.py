@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from skillframe.signals.kalman import WrenchFilter, WrenchModel, chunks, process_noise, transition
+from skillframe.signals import WrenchFilter, WrenchModel, chunks, process_noise, transition
 
 
 @pytest.mark.parametrize("jitter", [0.0, 0.4])

@@ -6,11 +6,12 @@ import pytest
 from skillframe.errors import SkillframeError
 from skillframe.frames import skew
 from skillframe.robot.kinematics import at, random_configuration
-from skillframe.robot.model import attach_payload, load_model
+from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot, robot_names
 from skillframe.world.convert import build_spec
 from skillframe.world.placement import fixture_poses
 from skillframe.world.plant import Plant
+from tests.references import attach_payload
 
 ROBOTS = sorted(robot_names())
 STATES = 20

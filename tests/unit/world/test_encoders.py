@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from skillframe.robot.joint_settings import Encoders
-from skillframe.world.encoders import JointEncoders
+from skillframe.robot.tables import Encoders
+from skillframe.world.sensors import JointEncoders
 
 DT = 1e-3
 SCENE = """<mujoco><worldbody>

@@ -6,9 +6,10 @@ from math import acos, atan, atan2, cos, degrees, pi, radians, sin
 
 import numpy as np
 import pytest
+from skillframe_worlds.hooks import skillframe_worlds as world_types
 
 from skillframe.errors import InputError
-from skillframe.extend.worlds import make_scene, world_types
+from skillframe.extend.records import make_scene
 from skillframe.frames import Pose, rotation_matrix
 from skillframe.world.scene import State
 

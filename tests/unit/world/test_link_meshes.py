@@ -8,10 +8,10 @@ import pytest
 
 from skillframe.campaign.folder import _copy_robot_file
 from skillframe.errors import InputError
+from skillframe.robot.meshes import MOST, thinned
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot
-from skillframe.robot.thinning import MOST, thinned
-from skillframe.world.collision_report import collision_problems
+from skillframe.world.collisions import collision_problems
 from skillframe.world.link_shapes import link_shapes
 
 INERTIAL = '<inertial><mass value="2"/><inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>'
@@ -68,7 +68,55 @@ def test_an_open_a_flat_and_an_unreadable_mesh_get_a_sentence_each(tmp_path):
     (tmp_path / "m.dae").write_text("<COLLADA/>")
     ((code, text),) = found(robot(tmp_path, '<mesh filename="m.dae"/>'))
     assert code == "unread_mesh"
-    assert "cannot be read as STL or OBJ" in text
+    assert "cannot be read as STL, OBJ or COLLADA" in text
+
+
+DAE = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit name="centimeter" meter="0.01"/><up_axis>Y_UP</up_axis></asset>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="pa" count="12">0 0 0 100 0 0 0 100 0 0 0 100</float_array><technique_common>
+<accessor source="#pa" count="4" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+<param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/><p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node id="n"><translate>50 0 0</translate>
+<instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
+
+
+def test_a_mesh_in_collada_counts_with_its_unit_and_where_its_node_puts_it(tmp_path):
+    pytest.importorskip("collada")
+    (tmp_path / "m.dae").write_text(DAE)
+    model = robot(tmp_path, '<mesh filename="m.dae"/>')
+    assert found(model) == []
+    (shape,) = link_shapes(model)
+    assert not shape.guessed and sorted(shape.geom.vertices.tolist()) == sorted(
+        (TETRA.reshape(-1, 3)[[0, 1, 2, 5]] + [0.5, 0, 0]).tolist()
+    )
+
+
+def test_meshes_that_cannot_be_read_get_one_sentence_together(tmp_path, monkeypatch):
+    monkeypatch.setattr("skillframe.world.link_shapes.missing_collada", lambda: True)
+    names = [f"m{i}.dae" for i in range(5)]
+    for name in names:
+        (tmp_path / name).write_text("<COLLADA/>")
+    joined = "</geometry></collision><collision><geometry>".join(f'<mesh filename="{name}"/>' for name in names)
+    (problem,) = collision_problems(robot(tmp_path, joined))
+    assert problem.message.startswith("meshes 'm0.dae', 'm1.dae', 'm2.dae' and 2 more cannot be read as STL, OBJ or")
+    assert problem.fix.startswith("pip install 'skillframe[collada]', or ")
+
+
+def test_a_body_of_which_nothing_is_drawn_is_as_thick_as_a_link_of_its_length(tmp_path):
+    text = f"""<robot name="r"><link name="base"/><link name="boom">{INERTIAL}</link><link name="hand">{INERTIAL}</link>
+    <joint name="a" type="revolute"><parent link="base"/><child link="boom"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="9" velocity="1"/></joint><joint name="b" type="revolute">
+    <parent link="boom"/><child link="hand"/><origin xyz="3 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="9" velocity="1"/></joint></robot>"""
+    (tmp_path / "r.urdf").write_text(text)
+    (tmp_path / "robot.toml").write_text('urdf = "r.urdf"\n[[arm]]\nname = "arm"\ntool_frame = "hand"\n')
+    (shape,) = link_shapes(load_model(load_robot(tmp_path / "robot.toml")))
+    assert shape.guessed and shape.geom.size == pytest.approx((0.3, 1.5))
 
 
 def test_a_mesh_that_is_not_there_is_named_by_the_audit_and_by_nothing_else(tmp_path):

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from skillframe.errors import InputError, UnknownName
+from skillframe.execution.recorder import geom_json
 from skillframe.frames import rotation_matrix
-from skillframe.world.drawing import geom_json
 from skillframe.world.scene import Geom
 from skillframe.world.shapes import surface_of_revolution
 
@@ -51,7 +51,7 @@ def test_a_mesh_with_a_hole_is_refused_in_one_sentence_with_what_its_hull_fills(
 
 
 def test_a_small_hole_in_a_large_plate_is_seen_where_a_ratio_of_volumes_sees_nothing(scene):
-    from skillframe.robot.convexity import hull_of, volume_of
+    from skillframe.robot.meshes import hull_of, volume_of
 
     vertices, faces = tube(outer=0.5, inner=0.003, height=0.02)
     assert hull_of(vertices).volume / volume_of(vertices, faces) < 1.0 + 1e-4  # 0.003^2 / 0.5^2 = 3.6e-5
@@ -86,7 +86,7 @@ def test_a_convex_mesh_passes_in_any_attitude_and_as_an_stl_rounds_it(scene, tur
 
 def test_the_dent_of_a_notched_block_is_its_depth():
     """A wedge cut into the top of a block to a depth of 7 mm: its lowest edge lies 7 mm under the hull."""
-    from skillframe.robot.convexity import dent, hull_of, volume_of
+    from skillframe.robot.meshes import dent, hull_of, volume_of
 
     x, top = [0.0, 0.04, 0.05, 0.06, 0.1], [0.02, 0.02, 0.013, 0.02, 0.02]
     vertices = np.array([[a, y, z] for y in (0.0, 0.05) for a, b in zip(x, top, strict=True) for z in (0.0, b)])
@@ -132,7 +132,7 @@ def test_a_kind_of_geom_that_there_is_not_is_refused_by_name(scene):
 
 def test_what_is_drawn_of_a_mesh_without_triangles_is_what_collides(scene):
     """The drawn triangles enclose the volume that MuJoCo gives the compiled mesh."""
-    from skillframe.robot.convexity import volume_of
+    from skillframe.robot.meshes import volume_of
 
     vertices = np.random.default_rng(5).normal(0.0, 0.03, (60, 3))
     drawn = geom_json(Geom(kind="mesh", vertices=vertices))

@@ -12,8 +12,8 @@ from skillframe.execution.executor import Setup, begin, simulate
 from skillframe.frames import norm
 from skillframe.robot.interface import Control
 from skillframe.robot.model import load_model
-from skillframe.robot.mount import Mount
 from skillframe.robot.spec import load_robot
+from skillframe.robot.tables import Mount
 from skillframe.world.placement import fixture_poses, start_configurations
 from skillframe.world.plant import Plant
 from tests.laws.pushing import Push, impedance
@@ -26,7 +26,7 @@ DOWN = (0.0, 0.0, -1.0)
 
 def robot(mount, control=None, heavy=0.0):
     """A UR5e. `heavy` is what its joints get of inertia, so that it hardly moves."""
-    made = load_model(load_robot("ur5e"))
+    made = load_model(load_robot("ur5e_torque"))
     model = copy.deepcopy(made.model)
     model.armature = model.armature + heavy
     return replace(made, model=model, spec=replace(made.spec, mount=mount, control=control or made.spec.control))
@@ -160,7 +160,7 @@ def test_an_arm_told_positions_touches_through_a_mount_at_twenty_millimetres_a_s
 
 @pytest.fixture
 def declared(tmp_path):
-    def load(text, robot="ur5e", extra=""):
+    def load(text, robot="kuka_iiwa14", extra=""):
         source = load_robot(robot).folder
         (tmp_path / "robot.toml").write_text((source / "robot.toml").read_text().replace(*extra or ("", "")) + text)
         for urdf in source.glob("*.urdf"):

@@ -1,13 +1,14 @@
 import numpy as np
 import pytest
+from skillframe_worlds.hooks import skillframe_worlds as world_types
 
 from skillframe.errors import InputError, SkillframeError, UnknownName
-from skillframe.extend.worlds import world_types
+from skillframe.execution.recorder import ratio
+from skillframe.extend.drives import check_quantities
 from skillframe.frames import Pose, rotation_matrix, rotation_vector
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot
-from skillframe.world.placement import check_quantities, fixture_poses, nominal_fixture, start_poses
-from skillframe.world.rates import ratio
+from skillframe.world.placement import fixture_poses, nominal_fixture, start_poses
 
 WORLDS = [record.name for record in world_types()]
 
@@ -69,7 +70,7 @@ def test_a_quantity_that_nothing_reads_is_refused_with_the_nearest_one():
         ("robot.mass_scale", 0.0, "0 is beyond 1e-06 to 100"),
         ("start.tilt_y", 1e300, r"1e\+300 rad is beyond -90deg to 90deg"),
         ("fixture.offset_x", np.nan, "nan m is beyond -3m to 3m"),
-        ("actuator.delay", 0.1, "free_tool has no actuators of its own"),
+        ("actuator.delay", 0.1, "free_tool has no drive with such a quantity"),
     ],
 )
 def test_a_quantity_that_cannot_be_is_refused_whichever_trial_has_it(key, value, message):
@@ -83,27 +84,3 @@ def test_rates_that_divide_give_their_ratio_and_others_are_refused_in_words():
     for slow in (300.0, 2000.0):
         with pytest.raises(SkillframeError, match="not a whole multiple"):
             ratio(1000.0, slow, "control", "the trace")
-
-
-@pytest.mark.parametrize(
-    ("value", "message"),
-    [
-        (5.0, r"5 s is beyond 0s to 1s, .*; did you mean 5ms\?"),
-        (-0.01, "-0.01 s is beyond 0s to 1s.*; give 0s to 1s$"),
-        (1e7, "1e.07 s is beyond 0s to 1s.*; give 0s to 1s$"),
-        (np.nan, "nan s is beyond"),
-    ],
-)
-def test_a_delay_that_no_valve_has_is_refused_with_its_unit(value, message):
-    crane = load_model(load_robot("hiab_xs031"))
-    check_quantities({"actuator.delay": np.array([0.0, 1.0])}, crane)
-    with pytest.raises(InputError, match=f"actuator.delay: {message}"):
-        check_quantities({"actuator.delay": np.array([0.01, value])}, crane)
-
-
-@pytest.mark.parametrize("key", ["sensor.force_noise", "sensor.torque_bias_x", "start.tilt_y"])
-def test_what_would_do_nothing_on_a_hydraulic_machine_is_refused_there_and_taken_elsewhere(key):
-    draws = {key: np.array([0.1])}
-    check_quantities(draws, load_model(load_robot("panda")))
-    with pytest.raises(InputError, match=f"{key}: hiab_xs031 (has no wrench sensor|moves in a plane)"):
-        check_quantities(draws, load_model(load_robot("hiab_xs031")))

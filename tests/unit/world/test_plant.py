@@ -4,9 +4,9 @@ import pytest
 from skillframe.control.impedance import null_space_damping
 from skillframe.frames import Pose, cross, norm, rotate, rotation_matrix
 from skillframe.robot.kinematics import at
-from skillframe.robot.model import attach_payload
 from skillframe.world.placement import fixture_poses, start_configurations
 from skillframe.world.plant import Plant
+from tests.references import attach_payload
 
 ALL = np.arange
 GRAVITY = np.array([0.0, 0.0, -9.81])

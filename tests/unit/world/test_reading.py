@@ -6,8 +6,9 @@ import pytest
 from skillframe.frames import quaternion_from_matrix, rotation_matrix
 from skillframe.world.placement import fixture_poses
 from skillframe.world.plant import Plant
+from skillframe.world.quantities import SensorSettings
 from skillframe.world.reading import Quaternions
-from skillframe.world.sensors import BLOCK, Sensors, SensorSettings
+from skillframe.world.sensors import BLOCK, Sensors
 from tests import fmu_cache
 from tests.laws.crane_plants import crane, empty_scene
 from tests.laws.runs import generators, robot, scene

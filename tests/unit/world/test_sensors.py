@@ -2,7 +2,8 @@ import numpy as np
 import pytest
 
 from skillframe.frames import move_wrench, rotate, rotation_vector
-from skillframe.world.sensors import BLOCK, Sensors, SensorSettings, at_point
+from skillframe.world.quantities import SensorSettings
+from skillframe.world.sensors import BLOCK, Sensors, at_point
 
 SILENT = SensorSettings(
     force_noise=0.0, torque_noise=0.0, force_bias=0.0, torque_bias=0.0, position_noise=0.0, rotation_noise=0.0

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from skillframe_worlds.hooks import skillframe_worlds as world_types
 
 from skillframe.errors import InputError
-from skillframe.extend.worlds import make_scene, world_types
+from skillframe.extend.records import make_scene
 from skillframe.frames import Pose, matrix_from_quaternion, rotation_matrix
 from skillframe.world.scene import State
 

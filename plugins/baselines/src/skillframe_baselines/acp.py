@@ -1,19 +1,17 @@
-r"""The estimator of an adaptive compliance policy: soft along the demonstrated force, stiff across it.
+r"""Estimator of an adaptive compliance policy: compliant along the demonstrated force, stiff across it.
 
-With f the force that the demonstrations exerted at a time, e = f / |f| and x the mean pose then,
+With f the demonstrated force on the environment at a time, e = f / |f| and x the mean pose then,
 
     k(|f|) = k_stiff up to f_low, k_soft from f_high on, linear between              (1)
     K = k_stiff (I - e e^T) + k e e^T                                                (2)
     x_v = x + (1/k) (f - (f.v) v)                                                    (3)
 
-v is the direction of motion where the reference moves: a force against it is taken for friction (`friction_out`). The
-robot is drawn to the virtual target x_v with stiffness K, so that, where it stands at x, it exerts f.
+v is the direction of motion, along which force is taken for friction (`friction_out`). At x, stiffness K towards the
+virtual target x_v exerts f.
 
-Hou et al. (2024), "Adaptive Compliance Policy" (arXiv:2410.09309): stiffness low along the force and high across it,
-reference and virtual target. The ramp (1), the removal in (3) and its threshold are those of the code the authors
-published; their equations' numbers were not at hand. Theirs is a network that infers x, x_v and k from images and
-forces. Here it is the labels that such a network is trained on, played over the demonstrations' common clock (`align`),
-because a simulated arm has no camera: what is compared is the estimator. Rotation is held stiff.
+Hou et al. (2024), "Adaptive Compliance Policy" (arXiv:2410.09309); (1) and the removal in (3) follow their code. Their
+network infers x, x_v and k from images and forces; here its training labels are played over a common clock (`align`).
+Rotation is stiff.
 """
 
 from __future__ import annotations
@@ -24,7 +22,6 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.config import build as configured
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
 from skillframe.extend.records import Document, LearnOptions
@@ -32,29 +29,23 @@ from skillframe.frames import Float, Pose, norm, quaternion_from_matrix
 from skillframe.skill import Command, Impedance, Observation, Skill
 from skillframe_baselines import align
 from skillframe_baselines.common import (
+    SETTLE,
     Following,
     array,
     body,
-    frame_in_base,
     goal_model,
     goal_of,
     phase_of,
     point_offset,
     pose_of,
-    positive,
-)  # fmt: skip
-from skillframe_baselines.document import SETTLE
+    settings_and_frame,
+)
 from skillframe_baselines.replay import Motion, Replay, motion
-
-STANDS = 1e-3  # m/s; a slower reference has no direction of motion
-HOLD = 0.05  # s for which a stiffness is kept, because every change makes the controller design its damping again
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AcpSettings(Following):
-    """Settings of the learner. Here `stiffness_translation` is k_stiff.
-
-    Without `feedforward` there is no force to go by: it is a stiff mean motion.
+    """Settings of the learner, with `stiffness_translation` as k_stiff, and a stiff mean motion without `feedforward`.
 
     Attributes:
         soft: k_soft [N/m].
@@ -69,14 +60,12 @@ class AcpSettings(Following):
 
 
 def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
-    """The body of a document: the mean motion and wrench over time, and the estimator's constants.
+    """Body of a document: mean motion and wrench over time, and the estimator's constants.
 
     Raises:
-        InputError: no demonstration, or demonstrations or settings that do not suit.
+        InputError: no demonstration, or unsuitable demonstrations or settings.
     """
-    settings = configured(AcpSettings, options.settings, "acp settings")
-    frame = frame_in_base("acp", demonstrations, options)
-    positive(settings, "acp")
+    settings, frame = settings_and_frame("acp", AcpSettings, demonstrations, options)
     common = align.aligned(align.recorded(demonstrations, np.array(frame["learned_at"])))
     model: dict[str, Any] = {
         **goal_model(common.goal), "duration": float(common.time[-1]), "states": common.state.mean(0).tolist(),
@@ -84,7 +73,7 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
         "forces": [settings.force_low, settings.force_high], "friction_out": float(settings.friction_out),
     }  # fmt: skip
     document = body("acp", frame, settings, model, float(common.time[-1]) + SETTLE)
-    check(document)
+    build(document)
     return document
 
 
@@ -101,7 +90,7 @@ class Estimator:
         self.stiff, self.soft, self.low, self.high, self.friction_out = stiff, soft, low, high, friction_out
 
     def stiffness(self, force: Float) -> tuple[Float, Float]:
-        """K (N, 3, 3), equation (2), and k (N,), equation (1) [N/m], of forces (N, 3) on the environment."""
+        """K (N, 3, 3) and k (N,) [N/m] of forces (N, 3) on the environment."""
         size = norm(force)
         k: Float = np.interp(size, [self.low, self.high], [self.stiff, self.soft])
         along = force / np.maximum(size, 1e-12)[:, None]
@@ -109,16 +98,16 @@ class Estimator:
         return self.stiff * np.eye(3) - (self.stiff - k)[:, None, None] * outer, k
 
     def ahead(self, force: Float, k: Float, velocity: Float) -> Float:
-        """Virtual target less reference (N, 3) [m], equation (3), of forces (N, 3) and velocities (N, 3)."""
-        speed = norm(velocity)[:, None]
-        way = np.where(speed > STANDS, velocity / np.maximum(speed, STANDS), 0.0)
+        """Virtual target less reference (N, 3) [m], of forces (N, 3) and velocities (N, 3)."""
+        speed, stands = norm(velocity)[:, None], 1e-3  # m/s; a slower reference has no direction of motion
+        way = np.where(speed > stands, velocity / np.maximum(speed, stands), 0.0)
         kept = force - (force * way).sum(-1, keepdims=True) * way if self.friction_out else force
         result: Float = kept / k[:, None]
         return result
 
 
 class Acp(Skill):
-    """The reference played as an absolute replay is, drawn to its virtual target.
+    """Absolute replay of the reference with its virtual target.
 
     Args:
         reference: replay of the mean motion and wrench.
@@ -137,27 +126,23 @@ class Acp(Skill):
         self._impedance = Impedance(np.zeros((len(rngs), 6, 6)))
 
     def step(self, observation: Observation) -> Command:
-        """The virtual target and the stiffness at this time, for each trial."""
+        """Virtual target and stiffness at this time."""
         played = self._reference.step(observation)
         force, velocity = played.feedforward[:, :3], played.twist[:, :3]
-        self._soften(observation.time - self._began, force)
+        hold = 0.05  # s between changes of stiffness, each of which makes the controller design its damping
+        slot = ((observation.time - self._began) / hold + 1e-9).astype(int)
+        over = slot != self._slot
+        if over.any():  # equations (1) and (2)
+            self._slot, stiffness = slot, self._impedance.stiffness.copy()
+            stiffness[over, :3, :3], self._k[over] = self._estimator.stiffness(force[over])
+            stiffness[over, 3:, 3:] = self._rotation * np.eye(3)
+            self._impedance = Impedance(stiffness)
         target = Pose(played.pose.position + self._estimator.ahead(force, self._k, velocity), played.pose.rotation)
         return played._replace(pose=target, impedance=self._impedance, feedforward=np.zeros_like(played.feedforward))
 
-    def _soften(self, time: Float, force: Float) -> None:
-        """Equations (1) and (2) in the trials where `HOLD` is over."""
-        slot = (time / HOLD + 1e-9).astype(int)
-        over = slot != self._slot
-        if not over.any():
-            return
-        self._slot, stiffness = slot, self._impedance.stiffness.copy()
-        stiffness[over, :3, :3], self._k[over] = self._estimator.stiffness(force[over])
-        stiffness[over, 3:, 3:] = self._rotation * np.eye(3)
-        self._impedance = Impedance(stiffness)
-
 
 def reference_of(document: Document) -> Motion:
-    """The mean motion and wrench of the centre of compliance.
+    """Mean motion and wrench of the centre of compliance.
 
     Raises:
         InputError: the document holds none.
@@ -177,7 +162,7 @@ def estimator_of(document: Document) -> Estimator:
     """The estimator of a document.
 
     Raises:
-        InputError: a constant is missing or makes no sense.
+        InputError: a constant is missing or invalid.
     """
     stiff, soft = phase_of(document, "acp").stiffness.translation, float(array(document, "soft"))
     low, high = array(document, "forces", 2)
@@ -201,16 +186,11 @@ def build(document: Document) -> Skill:
     return Acp(reference, estimator_of(document), phase.stiffness.rotation)
 
 
-def check(document: Document) -> None:
-    """Refuse a document that cannot be built, naming the key. Raises `InputError`."""
-    build(document)
-
-
 def describe(document: Document) -> list[str]:
-    """It in words."""
+    """The lines of its description."""
     estimator, reference = estimator_of(document), reference_of(document)
     return [
-        f"the mean motion of {reference.duration:.2f} s, drawn on by the mean force (largest "
+        f"the mean motion of {reference.duration:.2f} s, pulled by the mean force (largest "
         f"{norm(reference.wrench[:, :3]).max():.0f} N); the error of the start is blended away",
         f"soft along the force ({estimator.soft:g} N/m from {estimator.high:g} N on), stiff across it "
         f"({estimator.stiff:g} N/m); the goal stays where it was demonstrated, wherever the fixture is",

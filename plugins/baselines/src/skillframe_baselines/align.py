@@ -1,9 +1,8 @@
-r"""Demonstrations on one clock: dynamic time warping onto the one of median length.
+r"""Align demonstrations on one clock: dynamic time warping onto the one of median length.
 
-Every demonstration becomes a row of states at 100 Hz. Two are matched by their path of least total cost (Sakoe and
-Chiba 1978), a step right, up or both, with the cost of a pair the squared distance of (distance to the own end,
-angle to the own end, |F|), each divided by its largest value over all demonstrations. These features, our choice, are
-the same for demonstrations from either side of a task. The path is smoothed over 0.1 s, so that warping adds no jerk.
+States at 100 Hz are matched by the path of least total cost (Sakoe and Chiba 1978), the squared distance of (distance
+to the own end, angle to the own end, |F|), each over its largest value. These features are equal from either side of a
+task. The path is smoothed over 0.1 s against jerk.
 """
 
 from __future__ import annotations
@@ -15,12 +14,18 @@ import numpy as np
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
-from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, norm
-from skillframe_baselines.common import LARGEST_TURN, common_goal, state_of
-from skillframe_baselines.document import RATE, moving_average, resampled
+from skillframe.frames import (
+    Float,
+    Pose,
+    matrix_from_quaternion,
+    move_wrench,
+    norm,
+    rotation_matrix,
+    rotation_vector,
+)
+from skillframe_baselines.common import RATE, moving_average, resampled, state_of
 
 SMOOTH = 0.1  # s
-MATCH_RATE = 25.0  # Hz, of the samples that are matched; a person does not change pace faster
 
 
 class Recorded(NamedTuple):
@@ -48,6 +53,19 @@ class Aligned(NamedTuple):
     wrench: Float
 
 
+def common_goal(ends: Sequence[Pose]) -> Pose:
+    """Mean of the demonstrations' final poses.
+
+    Raises:
+        InputError: they ended more than a right angle apart.
+    """
+    first = ends[0].rotation
+    turns = np.stack([rotation_vector(end.rotation @ first.T) for end in ends])
+    if norm(turns).max() > np.pi / 2:
+        raise InputError("demonstrations", "end in orientations more than 90 degrees apart", "give those of one task")
+    return Pose(np.mean([end.position for end in ends], axis=0), rotation_matrix(turns.mean(0)) @ first)
+
+
 def recorded(demonstrations: Sequence[Demonstration], at: Float) -> Recorded:
     """States and wrenches of the learning point (3,), tool frame [m].
 
@@ -64,21 +82,28 @@ def recorded(demonstrations: Sequence[Demonstration], at: Float) -> Recorded:
         times.append(sampled["time"])
     goal = common_goal([Pose(pose.position[-1], pose.rotation[-1]) for pose in poses])
     states = [moving_average(state_of(pose, goal), round(SMOOTH * RATE)) for pose in poses]
+    largest_turn = 2.5  # rad from the goal's orientation, the limit of a rotation vector
     for demonstration, state in zip(demonstrations, states, strict=True):
-        if norm(state[:, 3:]).max() > LARGEST_TURN:
+        if norm(state[:, 3:]).max() > largest_turn:
             raise InputError(
                 demonstration.source or "demonstration",
-                f"turns by more than {np.rad2deg(LARGEST_TURN):.0f} degrees from its end",
+                f"turns by more than {np.rad2deg(largest_turn):.0f} degrees from its end",
                 "cut it into phases, or use replay",
             )
     return Recorded(goal, times, states, wrenches)
 
 
 def aligned(recordings: Recorded) -> Aligned:
-    """All demonstrations warped onto the one of median length. The clock runs for their mean duration."""
+    """All demonstrations warped onto the one of median length, over their mean duration."""
     order = np.argsort([len(state) for state in recordings.state], kind="stable")
     reference = int(order[len(order) // 2])
-    features = _features(recordings)
+    rows = [
+        np.stack([norm(s[:, :3] - s[-1, :3]), norm(s[:, 3:] - s[-1, 3:]), norm(w[:, :3])], axis=1)
+        for s, w in zip(recordings.state, recordings.wrench, strict=True)
+    ]
+    floor = np.array([1e-3, 1e-2, 1.0])  # m, rad, N: less variation has no weight
+    scale = np.maximum(np.max([row.max(0) for row in rows], axis=0), floor)
+    features = [row / scale for row in rows]
     states, wrenches = [], []
     for i, (state, wrench) in enumerate(zip(recordings.state, recordings.wrench, strict=True)):
         index = np.arange(len(state), dtype=float)
@@ -91,27 +116,14 @@ def aligned(recordings: Recorded) -> Aligned:
     return Aligned(recordings.goal, time, np.stack(states), np.stack(wrenches))
 
 
-def _features(recordings: Recorded) -> list[Float]:
-    rows = [
-        np.stack([norm(s[:, :3] - s[-1, :3]), norm(s[:, 3:] - s[-1, 3:]), norm(w[:, :3])], axis=1)
-        for s, w in zip(recordings.state, recordings.wrench, strict=True)
-    ]
-    floor = np.array([1e-3, 1e-2, 1.0])  # m, rad, N: what does not vary carries no weight
-    scale = np.maximum(np.max([row.max(0) for row in rows], axis=0), floor)
-    return [row / scale for row in rows]
-
-
 def _at(values: Float, index: Float) -> Float:
     samples = np.arange(len(values))
     return np.stack([np.interp(index, samples, column) for column in values.T], axis=1)
 
 
 def warp(reference: Float, other: Float) -> Float:
-    """For every row of `reference` (T, d), the fractional row of `other` (T', d) that it is matched with.
-
-    Increases from 0 to T' - 1.
-    """
-    stride = max(round(RATE / MATCH_RATE), 1)
+    """Increasing fractional rows of `other` (T', d), 0 to T' - 1, that match the rows of `reference` (T, d)."""
+    stride = round(RATE / 25.0)  # matched at 25 Hz, faster than a teacher's pace changes
     i, j = _sparse(len(reference), stride), _sparse(len(other), stride)
     path = np.array(_path(((reference[i][:, None] - other[j][None]) ** 2).sum(-1)))
     matched = np.array([j[path[path[:, 0] == row, 1]].mean() for row in range(len(i))])
@@ -127,7 +139,6 @@ def _sparse(count: int, stride: int) -> np.ndarray[tuple[int], np.dtype[np.int64
 
 
 def _path(cost: Float) -> list[tuple[int, int]]:
-    """The path of least total cost from corner to corner."""
     rows, columns = cost.shape
     total = np.full((rows + 1, columns + 1), np.inf)
     total[0, 0] = 0.0

@@ -2,12 +2,10 @@ r"""Dynamic movement primitives: a spring to the goal with a learned forcing ter
 
     tau^2 y'' = alpha (beta (g - y) - tau y') + f(z),    f(z) = z sum_i w_i psi_i(z) / sum_i psi_i(z)
 
-with alpha = 25, beta = 6.25 per degree of freedom of the state (`common`). Learned through the library
-`movement_primitives`, whose phase falls as z = exp(-alpha_z t / tau), to 0.01 at tau. Several
-demonstrations are aligned (`align`); their weights are averaged, which equals the regression on all of them because
-the clock is common. The start is where the tool is, the goal where the demonstrations ended. The wrench profile is a
-sum of the same basis functions. It is rolled out at the start of a run by our own integration, for all trials at once
-(tested against the library), so that a skill file runs without the library.
+with alpha = 25, beta = 6.25 per degree of freedom of the state (`common`), learned by the library
+`movement_primitives`, whose phase falls as z = exp(-alpha_z t / tau), to 0.01 at tau. Weights are averaged over aligned
+demonstrations (`align`), which equals regression on all of them. The same basis functions give the wrench profile. Runs
+integrate without the library, for all trials at once.
 """
 
 from __future__ import annotations
@@ -18,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.config import build as configured
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError, MissingDependency
 from skillframe.extend.records import Document, LearnOptions
@@ -26,24 +23,23 @@ from skillframe.frames import Float, Pose, move_wrench, norm, rotation_matrix, r
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 from skillframe_baselines import align
 from skillframe_baselines.common import (
+    SETTLE,
     Following,
     array,
     body,
+    example_demonstration,
     following_words,
-    frame_in_base,
     goal_model,
     goal_of,
     phase_of,
     point_offset,
     pose_of,
-    positive,
+    settings_and_frame,
     state_of,
-)  # fmt: skip
-from skillframe_baselines.document import SETTLE
+)
 
 ALPHA, BETA = 25.0, 6.25
-SPRING = 0.5  # times tau that the spring gets at the end: exp(-6) of what is left then
-STEP = 0.005  # s of integration; the spring's rate is 12.5 / tau, some 400 steps of a three-second motion
+STEP = 0.005  # s of integration; the spring's rate is 12.5 / tau
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,24 +81,16 @@ class Basis:
 
 
 def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
-    """The body of a DMP's document.
+    """Body of a DMP's document.
 
     Raises:
-        InputError: no demonstration, or demonstrations or settings that do not suit.
+        InputError: no demonstration, or unsuitable demonstrations or settings.
         MissingDependency: `movement_primitives` is not installed.
     """
-    settings = configured(DmpSettings, options.settings, "dmp settings")
-    frame = frame_in_base("dmp", demonstrations, options)
-    positive(settings, "dmp")
+    settings, frame = settings_and_frame("dmp", DmpSettings, demonstrations, options)
     if settings.weights < 2 or settings.regularization < 0.0:
         raise InputError("dmp settings", "weights must be 2 or more, regularization 0 or more", "correct them")
     common = align.aligned(align.recorded(demonstrations, np.array(frame["learned_at"])))
-    model = _fitted(common, settings)
-    tau = float(common.time[-1])
-    return body("dmp", frame, settings, {**goal_model(common.goal), **model}, (1.0 + SPRING) * tau + SETTLE)
-
-
-def _fitted(common: align.Aligned, settings: DmpSettings) -> dict[str, Any]:
     try:
         from movement_primitives.dmp import DMP
     except ImportError:
@@ -119,14 +107,16 @@ def _fitted(common: align.Aligned, settings: DmpSettings) -> dict[str, Any]:
     activations = basis.activations(common.time)
     ridge = activations.T @ activations + settings.regularization * np.eye(settings.weights)
     profile = np.linalg.solve(ridge, activations.T @ common.wrench.mean(0)).T
-    return {
-        "tau": tau, "alpha_z": basis.alpha_z, "centers": basis.centers.tolist(), "widths": basis.widths.tolist(),
+    model: dict[str, Any] = {
+        **goal_model(common.goal), "tau": tau, "alpha_z": basis.alpha_z,
+        "centers": basis.centers.tolist(), "widths": basis.widths.tolist(),
         "weights": np.mean(weights, axis=0).tolist(), "wrench_weights": profile.tolist(),
     }  # fmt: skip
+    return body("dmp", frame, settings, model, 1.5 * tau + SETTLE)  # the spring at the end leaves exp(-6)
 
 
 class Dmp(Skill):
-    """A rolled-out primitive per trial, from where the tool is to the demonstrated goal.
+    """A primitive per trial, from the tool's pose to the demonstrated goal.
 
     Args:
         basis: of the forcing term.
@@ -134,10 +124,10 @@ class Dmp(Skill):
         wrench_weights: (6, W) of the wrench profile, environment on tool at the learning point.
         goal: pose of the learning point.
         offset: (3,) centre of compliance minus learning point, tool frame.
-        impedance: how it is followed.
+        impedance: stiffness.
         gain: 1 to exert the wrench profile, 0 not to.
-        blend: seconds over which that grows.
-        stop: seconds after which it is done.
+        blend: its rise time [s].
+        stop: duration [s].
     """
 
     def __init__(
@@ -161,7 +151,7 @@ class Dmp(Skill):
         self._twist: Float = np.concatenate([rates, np.zeros_like(rates[:1])])
 
     def rollout(self, start: Float) -> Float:
-        """States (T, N, 6) every `STEP`, from rest at states (N, 6), by Runge-Kutta steps of fourth order."""
+        """States (T, N, 6) every `STEP`, from rest at (N, 6), by fourth-order Runge-Kutta steps."""
         count, tau = len(self._wrench), self._basis.tau
         times = np.arange(2 * count, dtype=np.float64) * (STEP / 2)
         force = (self._basis.activations(times) * self._basis.phase(times)[:, None]) @ self._weights.T
@@ -183,14 +173,15 @@ class Dmp(Skill):
         return np.stack(states)
 
     def step(self, observation: Observation) -> Command:
-        """The primitive's pose, twist and wrench at this time, for each trial."""
+        """The primitive's pose, twist and wrench at this time."""
         time = observation.time - self._began
         last, rows = len(self._position) - 1, np.arange(len(time))
         scaled = np.clip(time / STEP, 0.0, last)
         index = np.minimum(scaled.astype(int), last)
         after = STEP * (scaled - index)[:, None]
         twist = self._twist[index, rows]
-        pose = Pose(self._position[index, rows] + after * twist[:, :3], self._turned(index, rows, after * twist[:, 3:]))
+        rotation: Float = rotation_matrix(after * twist[:, 3:]) @ self._rotation[index, rows]
+        pose = Pose(self._position[index, rows] + after * twist[:, :3], rotation)
         risen = np.clip(time / self._blend, 0.0, 1.0)[:, None]
         lever = pose.position - pose.at(-self._offset).position
         wrench = move_wrench(self._wrench[index], lever)
@@ -199,10 +190,6 @@ class Dmp(Skill):
         reason[done] = "the learned motion is over"
         status = np.where(done, Status.SUCCESS, Status.RUNNING).astype(np.int64)
         return Command(pose, twist, self._impedance, -self._gain * risen * wrench, status, reason)
-
-    def _turned(self, index: np.ndarray[Any, Any], rows: np.ndarray[Any, Any], turn: Float) -> Float:
-        result: Float = rotation_matrix(turn) @ self._rotation[index, rows]
-        return result
 
 
 def build(document: Document) -> Skill:
@@ -227,13 +214,8 @@ def build(document: Document) -> Skill:
     )  # fmt: skip
 
 
-def check(document: Document) -> None:
-    """Refuse a document that cannot be built, naming the key. Raises `InputError`."""
-    build(document)
-
-
 def describe(document: Document) -> list[str]:
-    """A DMP in words."""
+    """The lines of its description."""
     phase, weights = phase_of(document, "dmp"), array(document, "weights", 6, None)
     goal = 1e3 * goal_of(document).position
     lines = [
@@ -246,13 +228,13 @@ def describe(document: Document) -> list[str]:
 
 
 def example() -> Document:
-    """A primitive of two seconds without forcing, 50 mm below where the example demonstrations start."""
+    """A two-second primitive without forcing, to 50 mm below the example demonstration's start."""
+
     from skillframe.document.file import new_document
     from skillframe.document.frame import frame_of
     from skillframe.extend.registry import registry
-    from skillframe.testing import example_demonstrations
 
-    demonstrations, count = example_demonstrations()[:1], 3
+    demonstrations, count = [example_demonstration()], 3
     goal = Pose(demonstrations[0].position[-1], demonstrations[0].pose.rotation[-1])
     zero = np.zeros((6, count)).tolist()
     model = {

@@ -1,10 +1,9 @@
-r"""Gaussian mixtures: fitted by EM, the number of components chosen by BIC, and regression by conditioning.
+r"""Gaussian mixtures: EM, the number of components by BIC, and regression by conditioning.
 
     p(x) = sum_k pi_k N(x; mu_k, Sigma_k),    BIC = -2 log L + n_parameters log n
 
-Every column is scaled to unit deviation before the fit (with a floor, so that one that does not move carries no
-weight), covariances get 1e-4 on their diagonal in those units, and EM starts from equal stretches of the samples'
-order: no chance is involved. All three are our choices.
+Columns are scaled to unit deviation (with a floor for constant ones), covariances get 1e-4 on their diagonal, and EM
+starts deterministically from equal stretches of the samples.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ import numpy as np
 from skillframe.frames import Float
 
 REGULARIZATION = 1e-4
-ROUNDS, IMPROVEMENT = 100, 1e-5  # of EM; stop when the mean log-likelihood grows by less
+ROUNDS = 100  # of EM
 
 
 class Mixture(NamedTuple):
@@ -46,7 +45,7 @@ def log_sum(values: Float) -> Float:
 
 
 def fit(samples: Float, components: int) -> tuple[Mixture, float]:
-    """A mixture of scaled samples (n, d) and its log-likelihood. It starts from equal stretches of their order."""
+    """A mixture of scaled samples (n, d) and its log-likelihood."""
     n, d = samples.shape
     shares = np.zeros((n, components))
     shares[np.arange(n), np.arange(n) * components // n] = 1.0
@@ -61,7 +60,7 @@ def fit(samples: Float, components: int) -> tuple[Mixture, float]:
         total = log_sum(logs)
         shares = np.exp(logs - total)
         now = float(total.mean())
-        if now - before < IMPROVEMENT:
+        if now - before < 1e-5:  # which stops when the mean log-likelihood grows by less
             break
         before = now
     assert mixture is not None
@@ -91,7 +90,7 @@ def scaled_back(mixture: Mixture, center: Float, scale: Float) -> Mixture:
 
 
 def conditional_mean(mixture: Mixture, given: Float) -> Float:
-    """E[rest | first columns] at rows (n, g) of the first g columns, (n, d - g): Gaussian mixture regression."""
+    """E[rest | first columns] at rows (n, g) of the first g columns, (n, d - g)."""
     n, g = given.shape
     inputs = Mixture(mixture.priors, mixture.means[:, :g], mixture.covariances[:, :g, :g])
     logs = log_densities(inputs, given)

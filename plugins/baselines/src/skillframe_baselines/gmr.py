@@ -2,10 +2,8 @@ r"""Gaussian mixture regression: pose and wrench as the mean of a mixture over (
 
     y(t), F(t) = E[y, F | t] = sum_k h_k(t) (mu_k + Sigma_k,x t / Sigma_k,tt (t - mu_k,t)),   h_k ~ pi_k N(t; ...)
 
-after Calinon, Guenter and Billard (2007), with the wrench F beside the pose y (`common`); demonstrations are aligned
-(`align`) and the number of components is chosen by BIC among five or more (`gmm`). The mean motion is played where it
-was demonstrated, the error of the start blended away as an absolute replay does, because a motion over time alone
-knows no start.
+after Calinon, Guenter and Billard (2007), with the wrench F beside the pose y (`common`), on aligned demonstrations
+(`align`). The mean motion is played as an absolute replay, since a motion over time alone has no start.
 """
 
 from __future__ import annotations
@@ -16,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.config import build as configured
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
 from skillframe.extend.records import Document, LearnOptions
@@ -24,19 +21,19 @@ from skillframe.frames import Float, quaternion_from_matrix
 from skillframe.skill import Skill
 from skillframe_baselines import align, gmm
 from skillframe_baselines.common import (
+    RATE,
+    SETTLE,
     Following,
     array,
     body,
     following_words,
-    frame_in_base,
     goal_model,
     goal_of,
     phase_of,
     point_offset,
     pose_of,
-    positive,
-)  # fmt: skip
-from skillframe_baselines.document import RATE, SETTLE
+    settings_and_frame,
+)
 from skillframe_baselines.replay import Motion, Replay, motion
 
 LEAST = np.array([0.05, *[1e-3] * 3, *[1e-2] * 3, *[0.5] * 3, *[0.05] * 3])
@@ -48,8 +45,8 @@ class GmrSettings(Following):
     """Settings of the learner.
 
     Attributes:
-        least_components, most_components: BIC chooses among these. Fewer than five tell the demonstrations apart rather
-            than the moments, and each then moves in a straight line; five is our choice, in the method's favour.
+        least_components, most_components: BIC chooses among these; fewer than five separate demonstrations rather than
+            moments.
     """
 
     least_components: int = 5
@@ -57,14 +54,12 @@ class GmrSettings(Following):
 
 
 def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
-    """The body of a GMR's document.
+    """Body of a GMR's document.
 
     Raises:
-        InputError: no demonstration, or demonstrations or settings that do not suit.
+        InputError: no demonstration, or unsuitable demonstrations or settings.
     """
-    settings = configured(GmrSettings, options.settings, "gmr settings")
-    frame = frame_in_base("gmr", demonstrations, options)
-    positive(settings, "gmr")
+    settings, frame = settings_and_frame("gmr", GmrSettings, demonstrations, options)
     if not 1 <= settings.least_components <= settings.most_components:
         raise InputError("gmr settings", "need 1 <= least_components <= most_components", "correct them")
     common = align.aligned(align.recorded(demonstrations, np.array(frame["learned_at"])))
@@ -97,7 +92,7 @@ def mixture_of(document: Document) -> gmm.Mixture:
 
 
 def mean_motion(document: Document) -> Motion:
-    """The conditional mean as a motion of the centre of compliance, at 100 Hz."""
+    """Conditional mean as a motion of the centre of compliance, at 100 Hz."""
     duration = float(array(document, "duration"))
     if not duration > 0.0:
         raise InputError("model.duration", "must be positive", "learn the skill again")
@@ -124,13 +119,8 @@ def build(document: Document) -> Skill:
     )  # fmt: skip
 
 
-def check(document: Document) -> None:
-    """Refuse a document that cannot be built, naming the key. Raises `InputError`."""
-    build(document)
-
-
 def describe(document: Document) -> list[str]:
-    """A GMR in words."""
+    """The lines of its description."""
     phase, mixture = phase_of(document, "gmr"), mixture_of(document)
     count = len(mixture.priors)
     lines = [

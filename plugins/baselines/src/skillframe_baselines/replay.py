@@ -1,4 +1,4 @@
-r"""Replay: the recorded motion as a desired motion, with stiff impedance and the recorded wrench as feed-forward.
+r"""Replay: the recorded motion with stiff impedance and the recorded wrench as feed-forward.
 
 With \(p(t), R(t)\) the recorded pose of the centre of compliance, \(p_0, R_0\) its first value, and \(p_m, R_m\) the
 pose measured at the start of the run, the desired pose is
@@ -7,20 +7,23 @@ pose measured at the start of the run, the desired pose is
     shifted, axes of the start  p_m + R_m R_0^T (p(t) - p_0)         R_m R_0^T R(t)
     absolute                    p(t) + (1 - s(t)) (p_m - p_0)        exp((1 - s(t)) log(R_m R_0^T)) R(t)
 
-where \(s\) rises smoothly from 0 to 1 over the blending time. The modes are our choice; replay is the baseline that
-published work compares compliant skills with.
+where \(s\) rises smoothly from 0 to 1 over the blending time. Published work compares compliant skills with replay.
+The document holds the tool point's trajectory and wrench at 100 Hz.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from skillframe.document.frame import read_frame
+from skillframe.config import build as configured
+from skillframe.demonstration.record import Demonstration
+from skillframe.document.frame import frame_of, read_frame
 from skillframe.errors import InputError
-from skillframe.extend.records import Document
+from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import (
     Float,
     Pose,
@@ -33,7 +36,59 @@ from skillframe.frames import (
     rotation_vector,
 )
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
-from skillframe_baselines.document import phase_of
+from skillframe_baselines.common import (
+    SETTLE,
+    Following,
+    Phase,
+    example_demonstration,
+    one_phase,
+    phase_body,
+    resampled,
+)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplaySettings(Following):
+    """How a recorded motion is played.
+
+    Attributes:
+        mode: "shifted": the recorded displacement from the tool's start; "absolute": the recorded poses, with the error
+            of the start blended away.
+    """
+
+    mode: Literal["shifted", "absolute"] = "shifted"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ReplayPhase(Phase):
+    """The phase of a replay's document, with the fields of `ReplaySettings`."""
+
+    mode: Literal["shifted", "absolute"]
+
+
+def phase_of(document: Document) -> ReplayPhase:
+    """The phase of a replay's document, checked.
+
+    Raises:
+        InputError: not one phase, or a key that is missing, unknown or invalid.
+    """
+    return one_phase(document, "replay", ReplayPhase)
+
+
+def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
+    """Body of a replay's document.
+
+    Raises:
+        InputError: not exactly one demonstration, an unknown setting, or a stiffness or blend that is not positive.
+    """
+    if len(demonstrations) != 1:
+        raise InputError("replay", f"repeats one demonstration, got {len(demonstrations)}", "give one file")
+    settings = configured(ReplaySettings, options.settings, "replay settings")
+    trajectory = resampled(demonstrations[0])
+    phase = {**phase_body("replay", settings, trajectory["time"][-1] + SETTLE), "mode": settings.mode}
+    body = {"frame": frame_of(demonstrations, options), "phases": [phase], "trajectory": trajectory}
+    phase_of(body)
+    return body
 
 
 class Motion(NamedTuple):
@@ -71,7 +126,7 @@ class Motion(NamedTuple):
 
 
 def motion(trajectory: Mapping[str, Any], point: Float) -> Motion:
-    """The recorded motion of a point of the tool frame, from the tool point's trajectory in a document.
+    """Recorded motion of a point of the tool frame, from a document's trajectory.
 
     Raises:
         InputError: a column is missing, or its rows do not fit.
@@ -98,16 +153,16 @@ def motion(trajectory: Mapping[str, Any], point: Float) -> Motion:
 
 
 class Replay(Skill):
-    """The recorded motion of the centre of compliance, shifted to the start or in its recorded place.
+    """Recorded motion of the centre of compliance, shifted to the start or in place.
 
     Args:
         recorded: motion of the centre of compliance.
-        absolute: play recorded poses; else the recorded displacement.
-        turned: the displacement is taken in the tool's attitude at the start; else in base axes.
+        absolute: play recorded poses, else the displacement.
+        turned: the displacement is in the tool's orientation at the start, else in base axes.
         stiffness: (6, 6) [N/m, Nm/rad].
         feedforward: exert the recorded wrench.
         blend: seconds over which the start's error vanishes and the feed-forward grows.
-        stop: seconds after which it is done.
+        stop: duration [s].
     """
 
     def __init__(
@@ -119,7 +174,7 @@ class Replay(Skill):
         self._blend, self._stop = blend, stop
 
     def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
-        """Remember where the tool is, against where the recording starts."""
+        """Store the tool's pose against the recording's start."""
         first = Pose(self._recorded.position[0], self._recorded.rotation[0])
         self._began = observation.time.copy()
         self._home = Pose(observation.pose.position.copy(), observation.pose.rotation.copy())
@@ -128,7 +183,7 @@ class Replay(Skill):
         self._turn_vector = rotation_vector(self._turn)
 
     def step(self, observation: Observation) -> Command:
-        """The desired motion at this time, for each trial."""
+        """Desired motion at this time."""
         time = observation.time - self._began
         pose, twist, wrench = self._recorded.at(time)
         place = self._in_place if self._absolute else self._shifted
@@ -181,6 +236,27 @@ def build(document: Document) -> Skill:
     )
 
 
-def check(document: Document) -> None:
-    """Refuse a document that cannot be built, naming the key. Raises `InputError`."""
-    build(document)
+def describe(document: Document) -> list[str]:
+    """The lines of its description."""
+    phase, trajectory = phase_of(document), document["trajectory"]
+    path = np.asarray(trajectory["position"])
+    length, (x, y, z) = norm(np.diff(path, axis=0)).sum(), 1e3 * (path[-1] - path[0])
+    how = {
+        "shifted": "from wherever the tool is at the start, knowing nothing of the fixture",
+        "absolute": "at the recorded place; the error of the start is blended away",
+    }[phase.mode]
+    lines = [
+        f"replay {trajectory['time'][-1]:.2f} s of recorded motion, {how}",
+        f"path {1e3 * length:.0f} mm, ending at {x:+.0f}, {y:+.0f}, {z:+.0f} mm from its start",
+        f"stiff in every direction: {phase.stiffness.translation:g} N/m, {phase.stiffness.rotation:g} Nm/rad",
+    ]
+    return [*lines, "exert the recorded wrench as well"] if phase.feedforward else lines
+
+
+def example() -> Document:
+    """A replay of the example demonstration."""
+
+    from skillframe.document.file import learned
+    from skillframe.extend.registry import registry
+
+    return learned(registry().skill("replay"), [example_demonstration()])

@@ -1,11 +1,11 @@
-r"""SEDS: a dynamical system of several linear ones, fitted under the constraint that it is globally stable.
+r"""SEDS: fit of a dynamical system of several linear ones that is globally stable.
 
     x' = sum_k h_k(x) A_k (x - x*),    h_k ~ pi_k N(x; mu_k, Sigma_k),    A_k + A_k^T < 0             (1)
 
-Khansari-Zadeh and Billard (2011), Theorem 2: V = |x - x*|^2 / 2 decreases everywhere but at x*. Every A_k is written as
--(L_k L_k^T + eps I) + S_k with L_k lower triangular and S_k skew, which is the constraint exactly, so that casadi and
-IPOPT minimise the mean squared error of the velocity (the paper's SEDS-MSE) over pi, mu, Sigma, L and S without
-further constraints. The start is a mixture of positions and velocities (`gmm`), its number of components by BIC.
+Khansari-Zadeh and Billard (2011), Theorem 2: V = |x - x*|^2 / 2 decreases everywhere but at x*. A_k = -(L_k L_k^T + eps
+I) + S_k with L_k lower triangular and S_k skew meets the constraint exactly; casadi and IPOPT minimise the mean squared
+error of the velocity (SEDS-MSE). BIC on positions and velocities (`gmm`) gives the number of components. They start
+from the best linear system, which stays if none is better, because the error has many local minima.
 """
 
 from __future__ import annotations
@@ -18,11 +18,10 @@ import numpy as np
 from skillframe.errors import InputError
 from skillframe.frames import Float
 from skillframe_baselines import gmm
-from skillframe_baselines.seds import SLOWEST, Dynamics
+from skillframe_baselines.dynamics import SLOWEST, Dynamics, Flow
 
 ITERATIONS = 150
-REACH = 8.0  # of every parameter from its start, so that no exponential overflows in a trial step
-PULL = 1e-5  # on the parameters' squares, so that those which the data leave open stay where they start
+REACH = 8.0  # largest change of a parameter, against overflow
 
 
 class _Symbols(NamedTuple):
@@ -39,7 +38,7 @@ def fit(states: Float, velocities: Float, most_components: int) -> Dynamics:
     """Stable dynamics of scaled states (n, d) with the goal at 0.
 
     Args:
-        states: (n, d) in units in which all matter alike.
+        states: (n, d) in comparable units.
         velocities: (n, d) their rates [1/s].
         most_components: BIC chooses among 1 to this many.
 
@@ -48,19 +47,30 @@ def fit(states: Float, velocities: Float, most_components: int) -> Dynamics:
     """
     scale = np.maximum(velocities.std(0), 1e-2)
     joint = np.column_stack([states, velocities / scale])
-    start = gmm.select(joint, most_components)
-    dynamics = _optimised(states, velocities, _initial(start, scale))
-    if not all(np.all(np.isfinite(part)) for part in dynamics):
+    mixture = gmm.select(joint, most_components)
+    found = _optimised(states, velocities, _linear(states, velocities))
+    d, count = len(scale), len(mixture.priors)
+    if count > 1:
+        shares = (mixture.priors, mixture.means[:, :d], mixture.covariances[:, :d, :d])
+        several = _optimised(states, velocities, Dynamics(*shares, np.repeat(found.matrices, count, axis=0)))
+        found = min(found, several, key=lambda each: _error(each, states, velocities))
+    if not _finite(found):
         raise InputError("seds", "the fit ends in numbers that are not finite", "give smoother demonstrations")
-    return dynamics
+    return found
 
 
-def _initial(mixture: gmm.Mixture, scale: Float) -> Dynamics:
-    """Regression matrices of the mixture, moved to the nearest stable ones."""
-    d = len(scale)
-    covariances = mixture.covariances[:, :d, :d]
-    slopes = np.stack([np.linalg.solve(c[:d, :d], c[:d, d:]).T * scale[:, None] for c in mixture.covariances])
-    return Dynamics(mixture.priors, mixture.means[:, :d], covariances, np.stack([_stable(a) for a in slopes]))
+def _finite(dynamics: Dynamics) -> bool:
+    return all(bool(np.all(np.isfinite(part))) for part in dynamics)
+
+
+def _error(dynamics: Dynamics, states: Float, velocities: Float) -> float:
+    return float(np.mean((Flow(dynamics)(states) - velocities) ** 2)) if _finite(dynamics) else np.inf
+
+
+def _linear(states: Float, velocities: Float) -> Dynamics:
+    spread: Float = states.T @ states / len(states) + gmm.REGULARIZATION * np.eye(states.shape[1])
+    slope = np.linalg.solve(spread, states.T @ velocities / len(states)).T.astype(np.float64)
+    return Dynamics(np.ones(1), np.zeros((1, len(slope))), spread[None], _stable(slope)[None])
 
 
 def _stable(matrix: Float) -> Float:
@@ -79,7 +89,8 @@ def _optimised(states: Float, velocities: Float, start: Dynamics) -> Dynamics:
     predicted = _velocity(parts, ca.DM(states.T))
     initial = np.concatenate([_packed(start, k) for k in range(count)])
     error = ca.sumsqr(predicted - ca.DM(velocities.T)) / velocities.size / float(np.mean(velocities**2))
-    problem = {"x": vector, "f": error + PULL * ca.sumsqr(vector - ca.DM(initial))}
+    # regularisation of parameters that the data leave open
+    problem = {"x": vector, "f": error + 1e-5 * ca.sumsqr(vector - ca.DM(initial))}
     options: dict[str, Any] = {
         "print_time": False, "ipopt.print_level": 0, "ipopt.sb": "yes", "ipopt.max_iter": ITERATIONS,
         "ipopt.hessian_approximation": "limited-memory", "ipopt.tol": 1e-6,
@@ -97,7 +108,6 @@ def _unpacked(vector: Any, d: int) -> _Symbols:
 
 
 def _triangle(values: Any, d: int) -> Any:
-    """Lower triangular from its column-wise values, the diagonal as logarithms."""
     matrix = ca.MX.zeros(d, d) if isinstance(values, ca.MX) else ca.DM.zeros(d, d)
     i = 0
     for column in range(d):
@@ -118,7 +128,6 @@ def _skew(values: Any, d: int) -> Any:
 
 
 def _packed(dynamics: Dynamics, k: int) -> Float:
-    """The parameters of a component, in the order of `_unpacked`."""
     d = dynamics.means.shape[1]
     factor = np.linalg.cholesky(np.linalg.inv(dynamics.covariances[k]))
     matrix = dynamics.matrices[k]
@@ -139,7 +148,6 @@ def _matrix(part: _Symbols) -> Any:
 
 
 def _velocity(parts: list[_Symbols], states: ca.DM) -> ca.MX:
-    """Equation (1) at states (d, n)."""
     logs = []
     for part in parts:
         white = part.factor.T @ (states - part.mean)

@@ -1,10 +1,10 @@
-"""skillframe plug-in: public benchmarks of assembly, run on parts that the user fetched (`skillframe benchmark`).
+"""Plug-in for assembly of parts that the user has: public benchmarks, and practice without a demonstration.
 
-Read `assets` (which parts there are), `methods` (what is compared), `assembly` (one pair: world, demonstrations,
-skills, campaigns), `runner` (many of them at a time), `scores` (the published check), `counts` (rates and intervals),
-`page` (what is shown). This module is all that `skillframe --help` imports.
+`skillframe benchmark`, in reading order: `assets` (parts), `methods`, `assembly` (one pair), `runner`, `scores`,
+`counts`, `page`. `skillframe practise`: `practice`. `skillframe --help` imports this module only.
 """
 
 from skillframe.extend.commands import LazyCommand
 
 benchmark = LazyCommand("Public benchmarks, on your copy of their parts.", "skillframe_benchmarks.command:command")
+practise = LazyCommand("Teach a skill from two meshes alone.", "skillframe_benchmarks.practice_command:command")

@@ -1,6 +1,6 @@
-"""One assembly of the benchmark: two meshes become a world, two demonstrations, a skill a method, and a campaign.
+"""One assembly of the benchmark: a world of two meshes, two demonstrations, a skill per method, and a campaign.
 
-Everything is kept in the assembly's folder. What is there is not made again, so that a run that was ended goes on.
+Results in the assembly's folder are kept, so that an interrupted run goes on.
 """
 
 from __future__ import annotations
@@ -17,44 +17,38 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from skillframe_parts.found import values
+from skillframe_parts.load import load
+from skillframe_teaching import sessions
+from skillframe_teaching.teacher import TeacherSettings
 
 from skillframe import Campaign, CampaignResults, LearnedSkill, Recording, record
-from skillframe.api.inputs import demonstrations_of
-from skillframe.api.pictures import picture_of
-from skillframe.api.tasks import robot_of, scene_of
+from skillframe.api.inputs import demonstrations_of, robot_of, scene_of
 from skillframe.campaign import evaluate
 from skillframe.campaign.folder import load as load_campaign
 from skillframe.campaign.runner import Options, run_campaign
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import SkillframeError, SkillframeWarning
+from skillframe.extend.records import make_scene, no_progress
 from skillframe.extend.registry import registry
-from skillframe.extend.worlds import make_scene
 from skillframe.files import write_whole
-from skillframe.parts.found import values
-from skillframe.parts.load import load
-from skillframe.teaching import sessions
-from skillframe.teaching.teacher import TeacherSettings
 from skillframe_benchmarks.assets import Pair
 from skillframe_benchmarks.methods import METHODS
 from skillframe_benchmarks.places import fitting
 
 SCORES = ("automate_height", "automate_distance")
 UPRIGHT, IN_PLACE = {"world.tilt": "2deg"}, {"world.sideways": "0.5mm"}
-"""How a demonstration is to end: nobody shows a part slanting, or far along an open slot (ours)."""
-LOOKS_M = 5e-4
-"""How exactly a person sees where the mouth is, who could not show it by pushing alone [m] (ours)."""
+"""Required ends of a demonstration, against parts left slanting or far along an open slot."""
 FEW = 5
-"""Attempts at a demonstration, side by side, before another person tries, or less is asked (ours)."""
-ABREAST = 400
-"""Trials that are simulated side by side: a tick takes some 0.8 ms, of one trial or of many (ours)."""
+"""Attempts at a demonstration before another teacher tries, or less is required."""
 DONE, REFUSED, UNLEARNED, TRIALS = "done.json", "refused.json", "unlearned.json", "trials"
 
 
 class Level(NamedTuple):
-    """How far the socket is from where the robot believes it.
+    """Error of the socket's believed place.
 
     Attributes:
-        name: shift, tilt and friction, as they are typed.
+        name: shift, tilt and friction.
         shift: largest shift along x and y [m].
         tilt: largest turn about x, y and z [rad].
         friction: Coulomb coefficient.
@@ -66,7 +60,7 @@ class Level(NamedTuple):
     friction: float
 
     def most(self) -> dict[str, float]:
-        """By how much the socket is off at most, by the name of the quantity [m, rad]."""
+        """Largest errors of the socket by quantity [m, rad]."""
         shifts = {f"fixture.offset_{axis}": self.shift for axis in "xy"}
         return shifts | {f"fixture.tilt_{axis}": self.tilt for axis in "xyz"}
 
@@ -77,7 +71,7 @@ LEVELS = tuple(
     for shift, degrees in ((0.001, 2.0), (0.002, 5.0))
     for friction in (0.2, 0.5)
 )
-"""2 mm and 5 degrees is how exactly the socket is seen in the published work; friction there is 0.5."""
+"""Published accuracy of the seen socket: 2 mm and 5 degrees, at friction 0.5."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -86,11 +80,11 @@ class Plan:
 
     Attributes:
         robot: name of a shipped robot, or a robot.toml.
-        trials: per level, the same draws for every method.
-        seed: of demonstrations; draws: of the draws, None: the same.
+        trials: per level, the same samples for every method.
+        seed: of demonstrations; draws: of the samples, None: the same.
         methods: names of `METHODS`.
         levels: names of `LEVELS`.
-        duration_s: of a trial, at most.
+        duration_s: longest duration of a trial.
     """
 
     robot: str = "panda"
@@ -104,7 +98,7 @@ class Plan:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AssemblyJob:
-    """An assembly, its folder and what is to be done: what a worker is handed."""
+    """A worker's job: an assembly, its folder and the plan."""
 
     pair: Pair
     folder: Path
@@ -112,12 +106,12 @@ class AssemblyJob:
 
     @property
     def size(self) -> int:
-        """How many results it gives."""
+        """Number of results."""
         return 1
 
 
 class Refused(Exception):
-    """An assembly that cannot be run, with the step that refused it and why."""
+    """An assembly that cannot be run, with the refusing step and reason."""
 
     def __init__(self, step: str, why: str) -> None:
         super().__init__(why)
@@ -125,10 +119,9 @@ class Refused(Exception):
 
 
 def run(job: AssemblyJob, tell: Callable[[str], None]) -> None:
-    """Everything that is missing of one assembly.
+    """Do what is missing of one assembly.
 
-    What refuses it stands in refused.json, with the step; methods that learn nothing from what was shown stand in
-    unlearned.json, and the others run.
+    refused.json has the refusing step; unlearned.json has methods that learn nothing, and the others run.
     """
     job.folder.mkdir(parents=True, exist_ok=True)
     cost = _Cost(job.folder / "cost.json")
@@ -160,7 +153,6 @@ def _run(job: AssemblyJob, cost: _Cost, tell: Callable[[str], None]) -> None:
 
 
 def _taught(job: AssemblyJob, shown: list[Demonstration]) -> tuple[dict[str, Path], dict[str, str]]:
-    """The skill's file of each method, and why the others have none."""
     skills, unlearned = {}, {}
     for name in job.plan.methods:
         try:
@@ -173,17 +165,17 @@ def _taught(job: AssemblyJob, shown: list[Demonstration]) -> tuple[dict[str, Pat
 
 @contextmanager
 def _refusing(job: AssemblyJob, step: str) -> Any:
-    """Refuses the step with the sentence of an error in it. Files in it are named from the assembly on."""
+    """Refuse the step with the sentence of an error in it, files relative to the assembly."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SkillframeWarning)  # of the recordings: the page counts what fails
+            warnings.simplefilter("ignore", SkillframeWarning)  # of the recordings: the page counts failures
             yield
     except SkillframeError as error:
         raise Refused(step, str(error).replace(str(job.folder), job.pair.name)) from None
 
 
 def _world(pair: Pair, folder: Path) -> Path:
-    """The fixture file beside copies of both meshes, and in parts.json what is found in them."""
+    """The fixture file beside copies of both meshes, and parts.json with their measures."""
     fixture = folder / "fixture.toml"
     for mesh in (pair.plug, pair.socket):
         if not (folder / mesh.name).exists():
@@ -191,14 +183,14 @@ def _world(pair: Pair, folder: Path) -> Path:
     if not fixture.exists():
         write_whole(fixture, fitting(pair, folder).encode())
     if not (folder / "parts.png").exists():
-        write_whole(folder / "parts.png", picture_of(make_scene(registry().world(str(fixture)), {})))
+        scene = make_scene(registry().world(str(fixture)), {})
+        registry().output("scene").write(scene, folder / "parts.png", no_progress)
     if not (folder / "parts.json").exists():
         _keep(folder / "parts.json", values(load(fixture)) | {"way_out_m": pair.way_out})
     return fixture
 
 
 def _shown(fixture: Path, folder: Path, plan: Plan) -> list[Demonstration]:
-    """Two demonstrations by the simulated person, from files."""
     files = [folder / f"demonstration{i}.npz" for i in (1, 2)]
     if not all(file.exists() for file in files):
         _recorded(fixture, plan).save(folder / "demonstration.npz")
@@ -206,13 +198,13 @@ def _shown(fixture: Path, folder: Path, plan: Plan) -> list[Demonstration]:
 
 
 def _recorded(fixture: Path, plan: Plan) -> Recording:
-    """Demonstrations that end upright and in place, as whoever shows a part again until it stands as it should.
+    """Demonstrations that end upright and in place, by repetition.
 
-    He pushes, and where that fails five times for one of them, he looks. Where both fail, because parts lean, it is
-    enough to be in place; where that fails, because parts slide, to be seated; and last by one who looks. Who looks
-    carries the part, and may teach no push.
+    The teacher pushes, and looks where that fails five times. Where both fail because parts lean, in place suffices;
+    where they slide, seated; last by looking. A teacher who looks carries the part, which may show no push.
     """
-    pushing, looking = TeacherSettings(), TeacherSettings(looks=LOOKS_M)
+    # Accuracy of a teacher's view of the hole entrance, where pushing alone fails [m]
+    pushing, looking = TeacherSettings(), TeacherSettings(vision_error=5e-4)
     for teacher, ends, attempts in (
         (pushing, IN_PLACE | UPRIGHT, FEW), (looking, IN_PLACE | UPRIGHT, sessions.MOST_ATTEMPTS),
         (pushing, IN_PLACE, 1), (pushing, {}, sessions.MOST_ATTEMPTS), (looking, IN_PLACE, FEW),
@@ -237,7 +229,7 @@ def _learned(name: str, shown: list[Demonstration], folder: Path) -> Path:
 
 
 def _campaign(fixture: Path, skills: dict[str, Path], out: Path, plan: Plan) -> dict[str, dict[str, int]]:
-    """Runs what is missing of the campaign of all levels. Successes by level and method."""
+    """Run what is missing of the campaign, and return successes by level and method."""
     levels = levels_of(plan.levels)
     if out.exists() and not _whole(out):
         shutil.rmtree(out)
@@ -248,7 +240,8 @@ def _campaign(fixture: Path, skills: dict[str, Path], out: Path, plan: Plan) -> 
             trials=plan.trials * len(levels), seed=seed, coc="tip", duration_s=plan.duration_s,
             vary=drawn(levels, plan.trials, seed), scores=list(SCORES), name=f"AutoMate {fixture.parent.name}",
         ).prepare(out)  # fmt: skip
-    run_campaign(out, evaluate.evaluate, Options(traces=0, chunk=ABREAST))
+    # Trials simulated side by side, limited because a tick takes 0.8 ms for one or many
+    run_campaign(out, evaluate.evaluate, Options(traces=0, chunk=400))
     rows = by_level(out, plan.levels, plan.trials)
     return {
         level: {
@@ -259,12 +252,12 @@ def _campaign(fixture: Path, skills: dict[str, Path], out: Path, plan: Plan) -> 
 
 
 def levels_of(names: Sequence[str]) -> list[Level]:
-    """Levels in the order in which their trials follow each other, whatever the order of their names."""
+    """Levels in the order of their trials."""
     return [level for level in LEVELS if level.name in names]
 
 
 def by_level(campaign: Path, names: Sequence[str], trials: int) -> dict[str, list[dict[str, Any]]]:
-    """Rows of an assembly's campaign, by the name of their level."""
+    """Results of an assembly's campaign by level."""
     levels = levels_of(names)
     found: dict[str, list[dict[str, Any]]] = {level.name: [] for level in levels}
     for row in CampaignResults(campaign).rows:
@@ -273,10 +266,10 @@ def by_level(campaign: Path, names: Sequence[str], trials: int) -> dict[str, lis
 
 
 def drawn(levels: Sequence[Level], trials: int, seed: int) -> dict[str, Any]:
-    """`[vary]` of a campaign in which levels follow each other, `trials` each.
+    """`[vary]` of a campaign of consecutive levels, `trials` each.
 
-    The socket is off in the same direction and by the same share of the most at every level, so that levels are
-    compared on like draws, and all of them are simulated side by side.
+    All levels use the same directions and shares of their largest error, so that they are comparable, and run side by
+    side.
     """
     shares = np.random.default_rng(seed).uniform(-1.0, 1.0, (len(LEVELS[0].most()), trials))
     vary = {
@@ -287,7 +280,6 @@ def drawn(levels: Sequence[Level], trials: int, seed: int) -> dict[str, Any]:
 
 
 def _whole(folder: Path) -> bool:
-    """Whether a campaign's folder was prepared to its end."""
     try:
         load_campaign(folder)
     except SkillframeError:
@@ -300,7 +292,7 @@ def _keep(path: Path, value: Any) -> None:
 
 
 class _Cost:
-    """Processor time of each step [s], kept in a file, added up over runs."""
+    """Processor time of each step [s], summed in a file."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
@@ -308,7 +300,7 @@ class _Cost:
 
     @contextmanager
     def of(self, step: str) -> Any:
-        """Within this, time is the step's."""
+        """Context whose time is the step's."""
         began = time.process_time()
         try:
             yield

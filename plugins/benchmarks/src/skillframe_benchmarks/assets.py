@@ -1,4 +1,4 @@
-"""The 100 pairs of AutoMate as the user fetched them. Nothing of them is shipped here."""
+"""The 100 pairs of AutoMate in the user's copy."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import NamedTuple
 from skillframe.errors import InputError, UnknownName
 
 MESHES = (Path("assets/automate/mesh"), Path("mesh"), Path())
-"""Where the pairs lie below the folder: in a checkout of the published repository, in its assets, or right there."""
+"""Folders of the pairs: in a checkout of the published repository, in its assets, or directly."""
 HEIGHTS = (Path("isaacgymenvs/tasks/automate/data"), Path("data"), Path())
 HEIGHTS_FILE = "disassembly_dist.json"
 DEVELOPED = (
@@ -18,7 +18,7 @@ DEVELOPED = (
     "00444", "00446", "00471", "00486", "00506", "00537", "00638", "00648", "00652", "00755", "00768", "00783", "00863",
     "01026", "01092", "01102", "01132",
 )  # fmt: skip
-"""Pairs that the method was developed on; reported apart from all others."""
+"""Pairs that the method was developed on, reported separately."""
 
 
 class Pair(NamedTuple):
@@ -27,7 +27,7 @@ class Pair(NamedTuple):
     Attributes:
         name: of the assembly, "00004".
         plug, socket: mesh files in metres, in the assembled pose, z out of the hole.
-        way_out: height from which their check no longer counts the plug as assembled [m]; None if it is not known.
+        way_out: height from which the published check no longer counts the plug as assembled [m]; None if unknown.
     """
 
     name: str
@@ -41,10 +41,11 @@ def pairs(folder: Path, names: tuple[str, ...] = ()) -> list[Pair]:
 
     Args:
         folder: a checkout of the published repository (its branch `automate`), or its folder assets/automate.
-        names: of those that are wanted; () for all.
+        names: of the wanted ones; () for all.
 
     Raises:
-        InputError: there is none, or the heights cannot be read. UnknownName: no such pair.
+        InputError: there is none, or the heights cannot be read.
+        UnknownName: no such pair.
     """
     meshes = next((folder / each for each in MESHES if any((folder / each).glob("*/asset_plug.obj"))), None)
     if meshes is None:

@@ -1,7 +1,7 @@
-"""Plugs and ports of the AI for Industry Challenge as worlds: boxes and cylinders of its SDF files, the user's copy.
+"""Plugs and ports of the AI for Industry Challenge as worlds of boxes and cylinders, from the user's SDF files.
 
-Models and frames: github.com/intrinsic-dev/aic, aic_assets/models, as of 2026-03-13. A plug is home where the frame of
-its tip is the frame of the port, whose z points into it. Nothing of the models is shipped here.
+Models and frames: github.com/intrinsic-dev/aic, aic_assets/models, as of 2026-03-13. A plug is seated where its tip
+frame equals the port's, whose z points into it.
 """
 
 from __future__ import annotations
@@ -13,27 +13,26 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from skillframe_parts.checks import THIN
+from skillframe_parts.fit import thickness
+from skillframe_parts.sdformat import DrawnLink, read_links
+from skillframe_parts.shapes import Shape
+from skillframe_parts.solid import of_shapes
 
 from skillframe.errors import InputError
 from skillframe.files import write_whole
 from skillframe.frames import Float, rotation_matrix
-from skillframe.parts.checks import THIN
-from skillframe.parts.fit import thickness
-from skillframe.parts.scenes import Shape
-from skillframe.parts.sdformat import DrawnLink, read_links
-from skillframe.parts.solid import of_shapes
 
 MODELS = (Path("aic_assets/models"), Path("models"), Path())
-"""Where the models lie below the folder: in a checkout of the published repository, in its assets, or right there."""
+"""Folders of the models: in a checkout of the published repository, in its assets, or directly."""
 STRAIGHT, NANO = 1e-5, 9
-"""Turns this near to right angles [rad] are meant as such, and places [m] to so many digits (ours): boxes that share a
-face then share it, and are cut into few pieces."""
+"""Tolerance of right angles [rad] and digits of places [m], so that boxes share faces."""
 THICK = 1.01 * THIN
-"""Of a plate at least [m]: contact does not hold thinner walls (ours)."""
+"""Least thickness of a plate [m], which contact needs."""
 LET_PASS, NOTHING, STEP = 1e-5, 1e-7, 1e-5
-"""Overlap that is let pass, that is none, and the steps in which a plug is moved until it rests [m] (ours)."""
+"""Overlap that is accepted, that counts as none, and steps of the plug until it rests [m]."""
 HIGHEST, LOWEST = 2e-4, -3e-3
-"""From where it is published [m] (ours): published boxes reach into each other, or leave room below the plug."""
+"""Range about the published place [m], as published boxes overlap or leave room below the plug."""
 FIXTURE = """\
 summary = "AI for Industry Challenge, {name}"
 [fixture]
@@ -48,7 +47,7 @@ friction = 0.5             # of the port, as published
 
 
 class Insertion(NamedTuple):
-    """A plug and its port: model, link that collides, and link whose frame is the tip's or the port's."""
+    """A plug and its port: model, colliding link, and link of the tip's or port's frame."""
 
     plug: tuple[str, str, str]
     port: tuple[str, str, str]
@@ -63,14 +62,14 @@ INSERTIONS = {
 
 
 class Written(NamedTuple):
-    """A fixture file, and how far the plug stands above the published frame [m]."""
+    """A fixture file, and the plug's height above the published frame [m]."""
 
     path: Path
     height: float
 
 
 def write(folder: Path, name: str, out: Path) -> Written:
-    """The world of one insertion, `out`/`name`/fixture.toml.
+    """Write the world of one insertion, `out`/`name`/fixture.toml.
 
     Args:
         folder: the user's copy.
@@ -93,7 +92,6 @@ def write(folder: Path, name: str, out: Path) -> Written:
 
 
 def _rest(plug: Any, port: Any, name: str) -> float:
-    """The least height over its published place from which on what the two have in common is a touch."""
     height = 0.0
     while height < HIGHEST and not _free(plug, port, height, LET_PASS):
         height += STEP
@@ -106,7 +104,7 @@ def _rest(plug: Any, port: Any, name: str) -> float:
 
 
 def _free(plug: Any, port: Any, height: float, most: float) -> bool:
-    """Is no common body of plug and port thicker than that, in the mean [m]?"""
+    """Whether no common body of plug and port is thicker than `most` on average [m]."""
     return all(thickness(each) <= most for each in (plug.translate([0.0, 0.0, height]) ^ port).decompose())
 
 
@@ -120,7 +118,7 @@ def _model(folder: Path, model: str) -> Path:
 
 
 def _in_frame(path: Path, body: str, frame: str) -> tuple[list[Shape], float]:
-    """What a link consists of, from another's frame turned about x, so that z points out of the port, and its mass."""
+    """Shapes of a link in another's frame turned about x, with z out of the port, and its mass."""
     links = read_links(path)
     for name in (body, frame):
         if name not in links:
@@ -134,31 +132,32 @@ def _in_frame(path: Path, body: str, frame: str) -> tuple[list[Shape], float]:
 
 
 def _straight(rotation: Float) -> Float:
-    """A rotation (3, 3), exactly by right angles where it nearly is."""
+    """A rotation (3, 3), by exact right angles where nearly so."""
     near: Float = np.round(rotation)
     return near if np.abs(rotation - near).max() < STRAIGHT else rotation
 
 
 def _thickened(path: Path, link: DrawnLink) -> list[Shape]:
-    """Shapes whose boxes are thick enough for contact to hold: thinner ones grow towards the middle of all shapes."""
+    """Shapes with boxes thick enough for contact, grown towards the middle of all."""
     for each in link.shapes:
         if each.kind == "mesh":
             raise InputError(path, f"has {each.name}, where boxes and cylinders are", "give the models as published")
     middle = np.mean([each.origin for each in link.shapes], axis=0)
-    return [_grown(each, middle) if each.kind == "box" and min(each.size) < THICK else each for each in link.shapes]
-
-
-def _grown(box: Shape, middle: Float) -> Shape:
-    size = np.array(box.size)
-    thin = int(np.argmin(size))
-    across = box.rotation[:, thin]
-    inwards = float(np.copysign(0.5 * (THICK - size[thin]), across @ (middle - box.origin)))
-    size[thin] = THICK
-    return replace(box, size=tuple(size.tolist()), origin=box.origin + inwards * across)
+    found = list[Shape]()
+    for each in link.shapes:
+        if each.kind == "box" and min(each.size) < THICK:
+            size = np.array(each.size)
+            thin = int(np.argmin(size))
+            across = each.rotation[:, thin]
+            inwards = float(np.copysign(0.5 * (THICK - size[thin]), across @ (middle - each.origin)))
+            size[thin] = THICK
+            found.append(replace(each, size=tuple(size.tolist()), origin=each.origin + inwards * across))
+        else:
+            found.append(each)
+    return found
 
 
 def _sdf(model: str, shapes: Sequence[Shape]) -> str:
-    """An SDFormat file of a model that stands and consists of these shapes."""
     root = ET.Element("sdf", version="1.9")
     drawn = ET.SubElement(root, "model", name=model)
     ET.SubElement(drawn, "static").text = "true"
@@ -176,7 +175,7 @@ def _sdf(model: str, shapes: Sequence[Shape]) -> str:
 
 
 def _rpy(rotation: Float) -> tuple[float, float, float]:
-    """Roll, pitch and yaw about fixed x, y, z. Yaw is taken off first: roll is known where pitch is 90 degrees."""
+    """Roll, pitch and yaw about fixed x, y, z, yaw first, as roll is defined at a pitch of 90 degrees."""
     yaw = float(np.arctan2(rotation[1, 0], rotation[0, 0]))
     left = rotation_matrix(np.array([0.0, 0.0, -yaw])) @ rotation
     return float(np.arctan2(-left[1, 2], left[1, 1])), float(np.arctan2(-left[2, 0], left[0, 0])), yaw

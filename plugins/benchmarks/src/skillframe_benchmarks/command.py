@@ -1,4 +1,4 @@
-"""`skillframe benchmark`: the hundred assemblies of AutoMate, and insertions of 100 points, from the user's copies."""
+"""`skillframe benchmark`: AutoMate's assemblies, and insertions of 100 points."""
 
 from __future__ import annotations
 
@@ -11,18 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from skillframe.cli.interrupts import terminable
-from skillframe.cli.numbers import COUNT, SEED
-from skillframe.cli.output import note, quiet_option
+from skillframe.cli.options import COUNT, SEED
+from skillframe.cli.output import note, terminable
 from skillframe.errors import InputError, UnknownName
 
 if TYPE_CHECKING:
     from skillframe_benchmarks.assembly import Plan
     from skillframe_benchmarks.counts import Found
-
-
-LAYOUT = 3
-"""Of a benchmark's folder: one campaign. The first had a campaign a level, the second a campaign a noise."""
+    from skillframe_benchmarks.practice import Practice
 
 
 @click.group(name="benchmark")
@@ -41,15 +37,16 @@ def command() -> None:
 @click.option("--out", type=click.Path(path_type=Path), default=Path("automate"), show_default=True,
               help="Folder for everything that is made, automate.json and automate.html.")  # fmt: skip
 @click.option("--robot", default="panda", show_default=True, help="A robot's name, or its robot.toml.")
-@click.option("--trials", default=20, show_default=True, type=COUNT, help="A level, the same draws for every method.")
+@click.option("--trials", default=20, show_default=True, type=COUNT, help="A level, the same samples for every method.")
 @click.option("--level", "levels", multiple=True, help="As 1mm-2deg-0.2: shift, tilt, friction [all four].")
 @click.option("--method", "methods", multiple=True, help="As lmc [all].")
-@click.option("--seed", default=1, show_default=True, type=SEED, help="Of demonstrations and draws.")
-@click.option("--draws", type=SEED, help="Seed of the draws, for others with the same demonstrations [--seed].")
+@click.option("--seed", default=1, show_default=True, type=SEED, help="Of demonstrations and samples.")
+@click.option(
+    "--trial-seed", "draws", type=SEED, help="Seed of the samples, for others with the same demonstrations [--seed]."
+)
 @click.option("--workers", type=COUNT, help="Assemblies at a time [number of cores].")
 @click.option("--list", "only_list", is_flag=True, help="List the assemblies, run nothing.")
 @click.option("--json", "as_json", is_flag=True, help="The table as JSON on stdout.")
-@quiet_option
 def automate(
     folder: Path, assemblies: tuple[str, ...], out: Path, robot: str, trials: int, levels: tuple[str, ...],
     methods: tuple[str, ...], seed: int, draws: int | None, workers: int | None, only_list: bool, as_json: bool,
@@ -77,7 +74,7 @@ def automate(
         robot=robot, trials=trials, seed=seed, draws=seed if draws is None else draws,
         methods=_chosen("method", methods, list(METHODS)), levels=_chosen("level", levels, known),
     )  # fmt: skip
-    _agree(out, plan)
+    agree(out, plan)
     jobs = [AssemblyJob(pair=pair, folder=(out / pair.name).resolve(), plan=plan) for pair in found]
     with terminable() as code:
         return _run(jobs, out, workers or os.cpu_count() or 1, as_json, code)
@@ -98,9 +95,10 @@ def insertion(folder: Path, out: Path) -> int:
       skillframe benchmark insertion aic --out insertion
       skillframe run sc.skill.json --world insertion/sc/fixture.toml --coc tip --score insertion_points
     """
+    from skillframe_parts.found import lines
+    from skillframe_parts.load import load
+
     from skillframe.errors import SkillframeError
-    from skillframe.parts.found import lines
-    from skillframe.parts.load import load
     from skillframe_benchmarks.boxes import INSERTIONS, write
 
     refused = []
@@ -125,15 +123,16 @@ def _chosen(what: str, given: Sequence[str], known: Sequence[str]) -> tuple[str,
     return tuple(name for name in known if name in given or not given)
 
 
-def _agree(out: Path, plan: Plan) -> None:
+def agree(out: Path, plan: Plan | Practice) -> None:
     """Keep the plan, or refuse a folder that was begun with another."""
     from skillframe.files import write_whole
 
-    path, mine = out / "plan.json", {**json.loads(json.dumps(asdict(plan))), "layout": LAYOUT}
+    # Version of a benchmark's folder
+    path, mine = out / "plan.json", {**json.loads(json.dumps(asdict(plan))), "layout": 3}
     if path.exists():
         theirs = json.loads(path.read_text(encoding="utf-8"))
         if theirs.get("draws") is None and "seed" in theirs:
-            theirs["draws"] = theirs["seed"]  # a folder of before they could differ
+            theirs["draws"] = theirs["seed"]  # a folder without `draws`
         other = [f"{key} = {theirs.get(key)!r}" for key in mine if theirs.get(key) != mine[key]]
         if other:
             raise InputError(out, f"was begun with {', '.join(other)}", "type the same, or choose another --out")

@@ -1,7 +1,6 @@
-"""What an assembly's folder says, and rates over many assemblies with intervals that know what the unit is.
+"""Results of assemblies, and rates over them with intervals.
 
-Trials of one assembly are alike, assemblies are not: an interval of a rate over assemblies is made by drawing
-assemblies again (percentile bootstrap, Efron 1979), never by counting trials as if they were independent.
+Trials of one assembly are correlated, so intervals resample assemblies (percentile bootstrap, Efron 1979), not trials.
 """
 
 from __future__ import annotations
@@ -14,15 +13,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from skillframe.campaign.rows import is_trial
 from skillframe_benchmarks.assembly import DONE, REFUSED, TRIALS, UNLEARNED, Level, by_level
 from skillframe_benchmarks.scores import passes
 
 DRAWS, OFTEN, FEWEST = 4000, 0.8, 5
-"""Bootstrap samples; share of trials from which an assembly counts as done (published: success of 80 %); assemblies
-below which no interval is given, for drawing a few again says nothing (our choice)."""
+"""Bootstrap samples, share of successes of a solved assembly (published: 80 %), and fewest assemblies for an interval.
+"""
 NOT_LEARNED = "not learned"
 RIM_M = 0.001
-"""Who ends within this of the mouth has not entered [m]; our choice."""
+"""Distance to the hole entrance within which a part has not entered [m]."""
 
 
 class Cell(NamedTuple):
@@ -30,9 +30,10 @@ class Cell(NamedTuple):
 
     Attributes:
         trials, seated: counts; seated is within 1 mm of the assembled height and 2 mm sideways.
-        checked: trials that pass the published check; None where its height is not known.
-        causes: of the trials that are not seated, how many by cause.
+        checked: trials that pass the published check; None where its height is unknown.
+        causes: counts of unseated trials by cause.
         force: median peak force, NaN if none ran [N]; seconds: median duration of seated trials, NaN without one.
+        refused: starts inside the socket, not counted as trials.
     """
 
     trials: int
@@ -41,6 +42,7 @@ class Cell(NamedTuple):
     causes: Mapping[str, int]
     force: float
     seconds: float
+    refused: int = 0
 
 
 class Found(NamedTuple):
@@ -49,11 +51,11 @@ class Found(NamedTuple):
     Attributes:
         name: of the assembly.
         refused: "step: why", or "" if it ran.
-        unlearned: by method that learned nothing from the demonstrations, why; its trials count as failed.
-        parts: what was found in its meshes; {} where they were refused.
+        unlearned: reason by method that learned nothing; its trials count as failed.
+        parts: measures of its meshes; {} where they were refused.
         cost: processor time of each step [s].
         cells: by (level, method).
-        picture: file of a picture of the parts; it may be absent.
+        picture: file of a picture of the parts, if any.
     """
 
     name: str
@@ -66,7 +68,7 @@ class Found(NamedTuple):
 
 
 class Share(NamedTuple):
-    """A rate over assemblies, its 95 % interval by drawing assemblies again (None of too few), how many reach 80 %."""
+    """A rate over assemblies, its 95 % bootstrap interval (None of too few), and the number that reach 80 %."""
 
     rate: float
     low: float | None
@@ -84,16 +86,11 @@ def read(folder: Path, levels: Iterable[Level]) -> Found | None:
     plan, unlearned = _json(folder / DONE), _json(folder / UNLEARNED)
     cells = _cells(folder / TRIALS, plan, parts) if (folder / TRIALS / "summary.json").exists() else {}
     if unlearned:
-        none = _failed(plan["trials"], parts)
+        checked, trials = None if parts.get("way_out_m") is None else 0, plan["trials"]
+        none = Cell(trials, 0, checked, {NOT_LEARNED: trials}, float("nan"), float("nan"))
         cells |= {(level.name, method): none for level in levels for method in unlearned}
     text = f"{refused['step']}: {refused['why']}" if refused else ""
     return Found(folder.name, text, unlearned, parts, _json(folder / "cost.json"), cells, folder / "parts.png")
-
-
-def _failed(trials: int, parts: Mapping[str, Any]) -> Cell:
-    """Of a method that learned nothing: all trials failed."""
-    checked = None if parts.get("way_out_m") is None else 0
-    return Cell(trials, 0, checked, {NOT_LEARNED: trials}, float("nan"), float("nan"))
 
 
 def _json(path: Path) -> dict[str, Any]:
@@ -109,15 +106,16 @@ def _cells(campaign: Path, plan: Mapping[str, Any], parts: Mapping[str, Any]) ->
     return {key: _cell(each, parts) for key, each in found.items()}
 
 
-def _cell(rows: Sequence[Mapping[str, Any]], parts: Mapping[str, Any]) -> Cell:
+def _cell(drawn: Sequence[Mapping[str, Any]], parts: Mapping[str, Any]) -> Cell:
+    rows = [row for row in drawn if is_trial(row)]
     way_out, lost = parts.get("way_out_m"), [row for row in rows if not row["success"]]
     checked = None if way_out is None else sum(passes(*_end(row), way_out) for row in rows)
     times = [row["duration_s"] for row in rows if row["success"]]
     return Cell(
         trials=len(rows), seated=len(rows) - len(lost), checked=checked,
         causes=Counter(cause(row, parts["depth_m"]) for row in lost),
-        force=float(np.median([row["peak_force_n"] for row in rows])),
-        seconds=float(np.median(times)) if times else float("nan"),
+        force=float(np.median([row["peak_force_n"] for row in rows])) if rows else float("nan"),
+        seconds=float(np.median(times)) if times else float("nan"), refused=len(drawn) - len(rows),
     )  # fmt: skip
 
 
@@ -126,7 +124,7 @@ def _end(row: Mapping[str, Any]) -> tuple[float, float]:
 
 
 def cause(row: Mapping[str, Any], depth: float) -> str:
-    """Why a trial is not seated: what ended it, or where it stood when it ended."""
+    """Why a trial is not seated: its end, or its final place."""
     if row["ended_by"] not in ("skill", "time"):
         return str(row["ended_by"]).replace("_", " ")
     height = _end(row)[0]
@@ -138,15 +136,12 @@ def cause(row: Mapping[str, Any], depth: float) -> str:
 
 
 def share(cells: Sequence[Cell], checked: bool = False) -> Share:
-    """The mean of some assemblies' rates, seated or by the published check."""
-    rates = np.array([_rate(cell, checked) for cell in cells])
+    """Mean rate of assemblies, seated or by the published check."""
+    hits = [float((cell.checked or 0) if checked else cell.seated) for cell in cells]
+    rates = np.array([n / cell.trials if cell.trials else float("nan") for n, cell in zip(hits, cells, strict=True)])
     low = high = None
     if len(rates) >= FEWEST:
         rng = np.random.default_rng(0)  # of the interval alone
         means = rng.choice(rates, (DRAWS, len(rates))).mean(axis=1)
         low, high = (float(each) for each in np.quantile(means, (0.025, 0.975)))
     return Share(float(rates.mean()), low, high, int((rates >= OFTEN).sum()), len(rates))
-
-
-def _rate(cell: Cell, checked: bool) -> float:
-    return float((cell.checked or 0) if checked else cell.seated) / cell.trials

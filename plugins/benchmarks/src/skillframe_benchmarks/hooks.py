@@ -1,12 +1,11 @@
-"""What skillframe-benchmarks registers. This module is all that is imported when plug-ins are listed."""
+"""Hooks of skillframe-benchmarks, the only module that listing plug-ins imports."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from skillframe.extend.hookspecs import hookimpl
-from skillframe.extend.outputs import ScoreType
-from skillframe.extend.records import Lazy
+from skillframe import hookimpl
+from skillframe.extend.records import Lazy, ScoreType
 
 skillframe_contract = "0.2"
 INSERTION = (
@@ -21,7 +20,7 @@ INSERTION = (
 
 @hookimpl
 def skillframe_scores() -> Iterable[ScoreType]:
-    """The two figures that AutoMate's check of an assembly looks at, and an insertion's points and what makes them."""
+    """The two figures of AutoMate's check, and an insertion's points with their parts."""
     yield ScoreType(
         name="automate_height", unit="m", compute=Lazy("skillframe_benchmarks.scores:height"),
         summary="height of the held part's origin above where it is when assembled, at the end",

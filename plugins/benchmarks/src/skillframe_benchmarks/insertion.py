@@ -1,9 +1,9 @@
-"""The 100 points of the AI for Industry Challenge for one insertion, and the figures that they are made of.
+"""The 100 points of the AI for Industry Challenge for one insertion, and their parts.
 
 Rules: docs/scoring.md of github.com/intrinsic-dev/aic, as of 2026-03-13. 1 point for a trial that ran; up to 6 for
 smoothness, 12 for time, 6 for a short way, where the third tier gives any; 75 for success, else 38 to 50 for part of
-the way in or up to 25 for being near; -12 for force, -24 for a collision. The port is the fixture's origin, into which
-the way is `progress` deep. There is one port, so none is wrong.
+the way in or up to 25 for being near; -12 for force, -24 for a collision. The port is the fixture's origin, `progress`
+deep.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
     from skillframe.execution.trace import Trace
 
 WINDOW, ORDER = 15, 2
-"""Samples and degree of the local polynomial that is fitted to the velocity."""
+"""Samples and degree of the local polynomial of the velocity."""
 MOVING_M_S, ROUGH = 0.01, 50.0
 """Speed from which jerk counts [m/s], and the jerk that earns nothing [m/s^3]."""
 FORCE_N, FORCE_S = 20.0, 1.0
 """A force above this [N] for longer than that [s] costs points."""
 QUICK_S, SLOW_S, DETOUR_M = 5.0, 60.0, 1.0
 ASIDE_M = 0.005
-"""How far from the port's axis, along x and along y, a part still counts as inside [m]."""
+"""Largest distance from the port's axis, along x and along y, of a part inside [m]."""
 
 
 def jerk(trace: Trace) -> float:
-    """Mean magnitude of the jerk while the tool moves [m/s^3], by samples. NaN if it is too short or diverged."""
+    """Mean magnitude of the jerk while the tool moves [m/s^3], NaN if too short or diverged."""
     from scipy.signal import savgol_filter
 
     velocity = trace.twist[:, :3]
@@ -42,7 +42,7 @@ def jerk(trace: Trace) -> float:
 
 
 def force_time(trace: Trace) -> float:
-    """The longest time on end for which the measured force is above 20 N [s]."""
+    """Longest continuous time with a measured force above 20 N [s]."""
     longest, since = 0.0, None
     for time, high in zip(trace.time.tolist(), (norm(trace.wrench[:, :3]) > FORCE_N).tolist(), strict=True):
         since = (time if since is None else since) if high else None
@@ -51,7 +51,7 @@ def force_time(trace: Trace) -> float:
 
 
 def energy(trace: Trace) -> float:
-    """Mechanical work of the hand at the centre of compliance, given and taken alike [J]."""
+    """Absolute mechanical work at the centre of compliance [J]."""
     power = np.abs(np.sum(trace.command_wrench * trace.twist, axis=1))
     return float(np.sum(0.5 * (power[1:] + power[:-1]) * np.diff(trace.time)))
 
@@ -62,7 +62,7 @@ def path(trace: Trace) -> float:
 
 
 def points(trace: Trace) -> float:
-    """Points of a trial. In a world without a port (fixture and depth) nothing is earned short of success."""
+    """Points of a trial, for success only in a world without a port (fixture and depth)."""
     meta = trace.meta
     deep = (meta.get("progress") or {}).get("of_m")
     names = [each["name"] for each in meta.get("bodies", ())]
@@ -79,7 +79,7 @@ def points(trace: Trace) -> float:
 
 
 def _motion(trace: Trace, start: float) -> float:
-    """The second tier without its penalties. A trial too short for a jerk did not move to speak of."""
+    """Second tier without penalties, where a trial too short for a jerk did not move."""
     rough = jerk(trace)
     return (
         6.0 * _left(0.0 if math.isnan(rough) else rough, 0.0, ROUGH)
@@ -89,19 +89,19 @@ def _motion(trace: Trace, start: float) -> float:
 
 
 def _short_of_success(tip: Float, deep: float, far: float) -> float:
-    """The third tier of a trial that failed, from where the tip (3,) ended, seen from the port."""
+    """Third tier of a failed trial, by the final tip (3,) in the port's frame."""
     if abs(tip[0]) <= ASIDE_M and abs(tip[1]) <= ASIDE_M and tip[2] < 0.0:
         return 38.0 + 12.0 * min(1.0, -float(tip[2]) / deep)
     return 25.0 * _left(float(np.linalg.norm(tip)), 0.0, far) if far > 0.0 else 0.0
 
 
 def _left(value: float, best: float, worst: float) -> float:
-    """1 up to the best value, 0 from the worst one on, a line between."""
+    """1 up to the best value, 0 from the worst one, linear between."""
     return min(1.0, max(0.0, (worst - value) / (worst - best)))
 
 
 def _tip(trace: Trace) -> Float:
-    """(T, 3) way of the tip in base [m], or of the centre of compliance where a tool names no tip."""
+    """(T, 3) way of the tip in base [m], or of the centre of compliance without a tip."""
     center = np.array(trace.meta.get("center_of_compliance", np.zeros(3)))
     tip = np.array(trace.meta.get("frames", {}).get("tip", center)) - center
     result: Float = trace.position + matrix_from_quaternion(trace.quaternion) @ tip

@@ -1,4 +1,4 @@
-"""The page and the table of AutoMate's assemblies: rates of every method, and each assembly with its picture."""
+"""Page and table of AutoMate's assemblies: rates of every method, and each assembly with its picture."""
 
 from __future__ import annotations
 
@@ -8,11 +8,12 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from skillframe.reports.markup import Markup, data_uri, join, note, table, tag
-from skillframe.reports.shell import POLICY
+from skillframe_reports.markup import Markup, data_uri, join, note, table, tag
+from skillframe_reports.shell import POLICY
+
 from skillframe_benchmarks.assembly import Level, Plan
 from skillframe_benchmarks.assets import DEVELOPED
-from skillframe_benchmarks.counts import OFTEN, Found, Share, share
+from skillframe_benchmarks.counts import OFTEN, Cell, Found, Share, share
 
 HEAD = ("level", "assemblies", "method", "seated", "95 % interval", ">= 80 %", "published check")
 GROUPS = ("developed on", "untouched")
@@ -34,7 +35,7 @@ class Total(NamedTuple):
 
 
 def totals(found: Sequence[Found], levels: Sequence[Level], methods: Sequence[str]) -> list[Total]:
-    """The table: assemblies that the method was developed on apart from all others."""
+    """The table, with developed-on assemblies apart."""
     out = []
     for level in levels:
         for group in GROUPS:
@@ -53,19 +54,16 @@ def lines(given: Sequence[Total]) -> list[tuple[str, ...]]:
     return [
         (
             each.level, f"{each.seated.assemblies} {each.group}", each.method, f"{each.seated.rate:.0%}",
-            _interval(each.seated), f"{each.seated.often} of {each.seated.assemblies}",
+            "too few" if each.seated.low is None else f"{each.seated.low:.0%} to {each.seated.high:.0%}",
+            f"{each.seated.often} of {each.seated.assemblies}",
             "" if each.checked is None else f"{each.checked.rate:.0%}",
         )
         for each in given
     ]  # fmt: skip
 
 
-def _interval(given: Share) -> str:
-    return "too few" if given.low is None else f"{given.low:.0%} to {given.high:.0%}"
-
-
 def plain(found: Sequence[Found], given: Sequence[Total]) -> dict[str, Any]:
-    """All of it as plain JSON values."""
+    """All of it as JSON values."""
     return {
         "totals": [
             {"level": t.level, "group": t.group, "method": t.method, **_share("seated", t.seated),
@@ -92,42 +90,41 @@ def _cell(cell: Any) -> dict[str, Any]:
 
 
 def render(found: Sequence[Found], given: Sequence[Total], plan: Plan, count: int) -> str:
-    """The whole document. It reaches for nothing outside."""
-    shared = files("skillframe.reports").joinpath("assets", "page.css").read_text(encoding="utf-8")
+    """The whole self-contained document."""
+    shared = files("skillframe_reports").joinpath("assets", "page.css").read_text(encoding="utf-8")
     head = tag(
         "head", tag("meta", charset="utf-8"), tag("meta", http_equiv="Content-Security-Policy", content=POLICY),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
         tag("title", "skillframe benchmark automate"), tag("style", Markup(shared + STYLE)),
     )  # fmt: skip
-    refused = [each for each in found if each.refused]
+    refused, count_unlearned = [each for each in found if each.refused], sum(bool(each.unlearned) for each in found)
+    unlearned = f"Of {count_unlearned} a method learned nothing, and its trials count as failed. " * bool(
+        count_unlearned
+    )
     said = (
-        f"{len(found)} of {count} assemblies done, {len(refused)} of them refused. {_unlearned(found)}"
+        f"{len(found)} of {count} assemblies done, {len(refused)} of them refused. {unlearned}"
         f"{plan.robot}, {plan.trials} trials a level and method, two demonstrations each "
-        f"(seed {plan.seed}; of the draws {plan.draws}). "
+        f"(seed {plan.seed}; of the samples {plan.draws}). "
         f"Seated: within 1 mm of the assembled height and 2 mm sideways, and the skill ended by itself. "
-        f"Intervals draw assemblies again. "
+        f"Intervals resample assemblies. "
         f"The column >= 80 % counts assemblies of which {OFTEN:.0%} of the trials and more are seated."
     )
+    shown = table(HEAD, lines(given), numeric=3) if given else note("Nothing ran yet.")
     each = tag("div", *map(_figure, found), class_="parts")
-    main = tag("main", tag("h1", "AutoMate's assemblies"), note(said), _totals(given), tag("h2", "One by one"), each)
+    main = tag("main", tag("h1", "AutoMate's assemblies"), note(said), shown, tag("h2", "One by one"), each)
     body = tag("body", main)
     return "<!DOCTYPE html>\n" + tag("html", head, body, lang="en")
 
 
-def _unlearned(found: Sequence[Found]) -> str:
-    count = sum(bool(each.unlearned) for each in found)
-    return f"Of {count} a method learned nothing, and its trials count as failed. " if count else ""
-
-
-def _totals(given: Sequence[Total]) -> Markup:
-    return table(HEAD, lines(given), numeric=3) if given else note("Nothing ran yet.")
+def _seated(cell: Cell) -> str:
+    return f"{cell.seated} of {cell.trials}" + (f", {cell.refused} starts refused" if cell.refused else "")
 
 
 def _figure(found: Found) -> Markup:
     parts = found.parts
     said = f"{1e3 * parts['depth_m']:.3g} mm deep, {1e3 * parts['clearance_m']:.2g} mm of play" if parts else ""
     rows = [
-        (tag("span", level, class_="level"), method, tag("span", f"{cell.seated} of {cell.trials}", class_="level"),
+        (tag("span", level, class_="level"), method, tag("span", _seated(cell), class_="level"),
          ", ".join(f"{n} {c}" for c, n in cell.causes.items()))
         for (level, method), cell in found.cells.items()
     ]  # fmt: skip

@@ -1,11 +1,11 @@
-"""Where a plug that overlaps its socket in the published place stands instead, and the fixture file that says so.
+"""Place of a plug that overlaps its socket as published, and the fixture file for it.
 
     1. raised by some hundredths of a millimetre
     2. moved by v, |v| <= 0.8 mm, to where V(v) + a |v| is least, V the volume that both parts claim
-    3. left, with `overlap` up to 20 um let pass, less than contacts sink by
+    3. left, with `overlap` up to 20 um accepted, less than contacts sink by
 
-The first that loads is taken. What counts as seated stays about the published place: it is narrower by what the plug
-was moved, so that whoever is seated is within 1 mm of the published height and 2 mm beside it. All of it is ours.
+The first that loads is taken. The tolerance of seating shrinks by the move, so that seated stays within 1 mm of the
+published height and 2 mm beside it.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from skillframe_parts.load import load
+from skillframe_parts.solid import read_part
 
 from skillframe.errors import InputError
 from skillframe.files import write_whole
 from skillframe.frames import Float
-from skillframe.parts.load import load
-from skillframe.parts.solid import read_part
 from skillframe_benchmarks.assets import Pair
 
 FIXTURE = """\
@@ -44,18 +44,18 @@ sideways = {sideways:g}
 tilt = "90deg"             # a loose part may lean in its socket
 """
 HEIGHT_M, SIDEWAYS_M = 0.001, 0.002
-"""How near the published place is seated [m]."""
+"""Tolerance of seating about the published place [m]."""
 RAISED = (0.0, 2e-5, 5e-5, 1e-4, 2e-4)
-"""Heights by which a plug that overlaps its socket in the published place is raised [m] (ours)."""
+"""Heights by which an overlapping plug is raised [m]."""
 MOVED_M, OVERLAP_M = 8e-4, 2e-5
-"""How far it is moved at most, and the overlap that is let pass where nothing else helps [m] (ours)."""
+"""Largest move, and overlap accepted where nothing else helps [m]."""
 PLACE = "the assembled pose"
 _STARTS = ((0.0, 0.0, 0.0), (0.03, 0.0, 0.0), (0.0, 0.03, 0.02), (0.0, 0.0, 0.05))  # mm
-_FIRST_MM, _PRICE, _TRIES = 0.05, 1e-6, 150  # size of the first simplex; mm3 for each mm moved
+_FIRST_MM = 0.05  # size of the first simplex
 
 
 def text(pair: Pair, moved: tuple[float, float, float] = (0.0, 0.0, 0.0), overlap: float = 0.0) -> str:
-    """A fixture file of a pair, its plug moved from the published place [m], with an overlap that is let pass [m]."""
+    """A fixture file of a pair, with the plug moved from the published place and an accepted overlap [m]."""
     x, y, z = (round(value, 7) for value in moved)
     place = f"assembled = {{ xyz = [{x:g}, {y:g}, {z:g}] }}  # moved: the meshes overlap\n" if any(moved) else ""
     let = f"overlap = {overlap:g}  # the meshes overlap\n" if overlap else ""
@@ -65,9 +65,7 @@ def text(pair: Pair, moved: tuple[float, float, float] = (0.0, 0.0, 0.0), overla
 
 
 def fitting(pair: Pair, folder: Path) -> str:
-    """The text of the first fixture file that loads, or that is refused for another reason than an overlap.
-
-    Where all overlap, that of the published place.
+    """Text of the first fixture file that loads or has another error than overlap, else of the published place.
 
     Args:
         pair: the two parts.
@@ -102,7 +100,7 @@ def _texts(pair: Pair) -> Iterator[str]:
 
 
 def free_place(pair: Pair) -> Float:
-    """How far (3,) the plug has to be moved from the published place until it overlaps least [m].
+    """Move (3,) of the plug from the published place with the least overlap [m].
 
     Raises:
         InputError: a mesh cannot be read.
@@ -113,12 +111,12 @@ def free_place(pair: Pair) -> Float:
 
     def cost(moved: Float) -> float:
         volume = abs(float((plug.translate([1e-3 * x for x in moved]) ^ socket).volume()))
-        return 1e9 * volume + _PRICE * float(np.linalg.norm(moved))
+        return 1e9 * volume + 1e-6 * float(np.linalg.norm(moved))  # mm3 for each mm moved
 
     found = []
     for start in np.array(_STARTS):
         first = np.vstack([start, start + _FIRST_MM * np.eye(3)])
-        options = {"maxfev": _TRIES, "xatol": 1e-3, "fatol": 1e-7, "initial_simplex": first}
+        options = {"maxfev": 150, "xatol": 1e-3, "fatol": 1e-7, "initial_simplex": first}
         found.append(minimize(cost, start, method="Nelder-Mead", options=options))
     best: Float = 1e-3 * min(found, key=lambda each: float(each.fun)).x
     return best

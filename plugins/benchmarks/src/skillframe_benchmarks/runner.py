@@ -1,4 +1,4 @@
-"""Many assemblies at a time, each in a worker of a campaign's pool: one that fails or is ended costs itself only."""
+"""Many assemblies in a campaign's pool of workers, whose failures stay separate."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from typing import Any
 
 from skillframe.campaign.cluster import ClusterPool
 from skillframe.campaign.driver import WHY, Died, Raised
-from skillframe.campaign.identity import identity
-from skillframe.campaign.lock import FolderLock
+from skillframe.campaign.folder import FolderLock
+from skillframe.campaign.provenance import identity
 from skillframe_benchmarks import assembly
 from skillframe_benchmarks.assembly import DONE, AssemblyJob
 
@@ -22,38 +22,35 @@ WATCH = "watch"
 
 
 def run(jobs: Sequence[AssemblyJob], out: Path, workers: int, tell: Tell) -> list[str]:
-    """Run what is missing. What a worker had finished is kept, whatever ends the run.
+    """Run what is missing, keeping finished results.
 
     Args:
         jobs: the assemblies.
         out: folder of the whole benchmark.
         workers: assemblies at a time.
-        tell: is told what happens.
+        tell: called with messages.
 
     Returns:
         sentences about assemblies that ended in an internal error.
 
     Raises:
         InputError: another process runs the same benchmark.
-        SchedulerError: no workers. KeyboardInterrupt: Ctrl-C; the workers are ended.
+        SchedulerError: no workers.
+        KeyboardInterrupt: Ctrl-C; the workers are ended.
     """
     out.mkdir(parents=True, exist_ok=True)
     with FolderLock(out):
-        return _missing(jobs, out, workers, tell)
-
-
-def _missing(jobs: Sequence[AssemblyJob], out: Path, workers: int, tell: Tell) -> list[str]:
-    waiting = deque(job for job in jobs if not (job.folder / DONE).exists())
-    if len(waiting) < len(jobs):
-        tell(f"{len(jobs) - len(waiting)} of {len(jobs)} assemblies are there already in {out}")
-    if not waiting:
-        return []
-    pool = ClusterPool(
-        compute, math.inf, workers=min(workers, len(waiting)), watch=out / WATCH, ours=identity(plugins=False),
-        needed=set(), tell=lambda share: None, note=tell,
-    )  # fmt: skip
-    with closing(pool):
-        return _work_off(pool, waiting, tell)
+        waiting = deque(job for job in jobs if not (job.folder / DONE).exists())
+        if len(waiting) < len(jobs):
+            tell(f"{len(jobs) - len(waiting)} of {len(jobs)} assemblies are there already in {out}")
+        if not waiting:
+            return []
+        pool = ClusterPool(
+            compute, math.inf, workers=min(workers, len(waiting)), watch=out / WATCH, ours=identity(plugins=False),
+            needed=set(), tell=lambda share: None, note=tell,
+        )  # fmt: skip
+        with closing(pool):
+            return _work_off(pool, waiting, tell)
 
 
 def _work_off(pool: Any, waiting: deque[AssemblyJob], tell: Tell) -> list[str]:
@@ -77,10 +74,10 @@ def _work_off(pool: Any, waiting: deque[AssemblyJob], tell: Tell) -> list[str]:
 
 
 def compute(job: AssemblyJob) -> list[dict[str, Any]]:
-    """One assembly. Runs in a worker.
+    """Run one assembly in a worker.
 
     Returns:
-        what there is to tell, a `text` each.
+        messages, a `text` each.
     """
     told: list[dict[str, Any]] = []
     with redirect_stdout(sys.stderr):

@@ -1,9 +1,9 @@
 """AutoMate's check of an assembly, as two figures of a trial's end.
 
-Their check (`check_plug_inserted_in_socket`; Tang et al., "AutoMate: Specialist and Generalist Assembly Policies over
-Diverse Geometries", RSS 2024, and the code released with it): the plug's origin is above the socket's and lower than a
-height of each assembly, and the mean distance of four key points, on the line of 1 m along z through both origins,
-is below 20 mm. A plug that stands on the rim of a shallow socket passes it.
+`check_plug_inserted_in_socket` (Tang et al., "AutoMate: Specialist and Generalist Assembly Policies over Diverse
+Geometries", RSS 2024, and its code): the plug's origin is above the socket's and below a height of each assembly, and
+the mean distance of four key points, on the line of 1 m along z through both origins, is below 20 mm. A plug on the rim
+of a shallow socket passes it.
 """
 
 from __future__ import annotations
@@ -17,11 +17,9 @@ from skillframe.frames import Float, matrix_from_quaternion, norm
 if TYPE_CHECKING:
     from skillframe.execution.trace import Trace
 
-NEAR_M = 0.02
-"""The published threshold of the key points' mean distance [m]."""
 SINK_M = 1e-3
-"""How far below the assembled pose still counts as above the socket [m]. Theirs is 0: but contact gives, in both
-simulators, so that a plug at rest lies some micrometres lower."""
+"""Depth below the assembled pose that still counts as above the socket [m]; published 0, but contact is compliant in
+both simulators."""
 KEY_POINTS: Float = np.linspace(-0.5, 0.5, 4)
 """Places of the key points on their line, from the origin [m]."""
 
@@ -29,22 +27,23 @@ KEY_POINTS: Float = np.linspace(-0.5, 0.5, 4)
 def height(trace: Trace) -> float:
     """Height of the held part's origin above the assembled one at the end, along the way out [m].
 
-    In a world of no fixture file, whose parts have no assembled pose, it is the tip's height over the fixture's origin.
+    Without a fixture file it is the tip's height over the fixture's origin.
     """
     turn, shift, origin = _left(trace)
     return float((turn @ origin + shift - origin)[2])
 
 
 def distance(trace: Trace) -> float:
-    """Mean distance of the four key points from where they are when assembled, at the end [m]. Likewise."""
+    """Mean distance of the four key points from their assembled places at the end [m]."""
     turn, shift, origin = _left(trace)
     points = origin + np.outer(KEY_POINTS, (0.0, 0.0, 1.0))
     return float(norm(points @ turn.T + shift - points).mean())
 
 
 def passes(height_m: float, distance_m: float, way_out_m: float) -> bool:
-    """Whether a trial passes the published check. `way_out_m` is the assembly's height (`disassembly_dist`)."""
-    return -SINK_M < height_m < way_out_m and distance_m < NEAR_M
+    """Whether a trial passes the published check, `way_out_m` being the assembly's `disassembly_dist`."""
+    # Published threshold of the key points' mean distance [m]
+    return -SINK_M < height_m < way_out_m and distance_m < 0.02
 
 
 def _left(trace: Trace) -> tuple[Float, Float, Float]:

@@ -1,4 +1,4 @@
-"""skillframe plug-in: two arms under one impedance law, the coordinator `dual_arm`, and the world `dual_peg`."""
+"""Plug-in for two arms: the coordinator `dual_arm` and the world `dual_peg`."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ skillframe_contract = "0.2"
 
 @hookimpl
 def skillframe_coordinators() -> Iterable[CoordinatorType]:
-    """The coordinator that this plug-in provides."""
+    """The coordinator of this plug-in."""
     yield CoordinatorType(
         name="dual_arm",
-        summary="two arms push one way and give way in others, each for itself or as one relative task",
+        summary="two arms push one way and are compliant in others, each for itself or as one relative task",
         build=Lazy("skillframe_dualarm.runtime:build"),
         check=Lazy("skillframe_dualarm.document:read_phase"),
         learn=Lazy("skillframe_dualarm.learner:learn"),
         settings=Lazy("skillframe_dualarm.learner:Settings").load,
-        describe=Lazy("skillframe_dualarm.describe:describe"),
+        describe=Lazy("skillframe_dualarm.document:describe"),
         centers=Lazy("skillframe_dualarm.document:centers"),
     )
 
 
 @hookimpl
 def skillframe_worlds() -> Iterable[WorldType]:
-    """The world that this plug-in provides."""
+    """The world of this plug-in."""
     from skillframe_dualarm import dual_peg
 
     yield WorldType(

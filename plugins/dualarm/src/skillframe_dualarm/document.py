@@ -1,8 +1,7 @@
-"""What two arms do together, as checked records, and the published configurations A to E.
+"""Phase of two arms as checked records, and the published configurations A to E.
 
-One linear motion with compliance is shared by both arms: the same direction, compliant axes and stiffness, each arm in
-its own tool axes at the start (as published). Arms differ in where their centre of compliance is, in which of
-translation and rotation they give way, and in their share of the motion (published: 1 and 0).
+Both arms share one linear motion with compliance, each in its own tool axes at the start. They differ in their centre
+of compliance, compliant parts, and share of the motion (published: 1 and 0).
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ class Arm:
 
     Attributes:
         center_of_compliance: point of its tool frame [m].
-        compliant: in what it gives way along the phase's compliant axes: "translation", "rotation", both or nothing.
+        compliant: "translation", "rotation", both or nothing, along the phase's compliant axes.
         share: of the motion along the desired direction; the arms' shares add up to 1.
     """
 
@@ -40,17 +39,17 @@ class Arm:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Phase:
-    """A motion with compliance for two arms. Stiffness, speed, lead and limits are ours: the paper gives none.
+    """A motion with compliance for two arms, with stiffness, speed, lead and limits that the paper lacks.
 
     Attributes:
         arms: the arm that holds the tool, then the one that holds the fixture.
         desired_direction: (3,) unit vector, first arm's tool axes at the start.
         compliant_translation, compliant_rotation: unit vectors, each arm's own tool axes at the start.
-        mode: "independent": each arm knows itself alone (published); "relative": what is compliant is the motion of
-            one arm relative to the other, while the pair as a whole is held.
+        mode: "independent": no coupling (published); "relative": compliant in the relative motion of the arms, stiff as
+            a pair.
         speed: of one arm relative to the other [m/s].
         stiffness: [N/m]; turn_stiffness: [Nm/rad]; zero along compliant axes.
-        lead_force_n: largest push; the desired pose of an arm never leads by more than this over the stiffness.
+        lead_force_n: largest push; the desired pose of an arm leads by at most this over the stiffness.
         stall_s, stall_m: at rest when, while pushing, the arms have approached by less than this for this long.
         time_limit_s: longer than this fails.
     """
@@ -77,16 +76,16 @@ CONFIGURATIONS: dict[str, tuple[tuple[str, tuple[str, ...]], tuple[str, tuple[st
     "D": (("tip", ("rotation",)), ("tip", ("rotation",))),
     "E": (("tip", BOTH), ("tip", BOTH)),
 }
-"""Table I of the two-arm paper: per arm the centre of compliance and what is compliant; master (peg), then slave."""
+"""Table I of the two-arm paper: centre of compliance and compliant parts of master (peg), then slave."""
 
 
 def configured(phase: Phase, name: str, frames: dict[str, Vector]) -> Phase:
-    """A phase in one of the configurations A to E, the first arm moving.
+    """A phase in a configuration A to E, the first arm moving.
 
     Args:
         phase: everything else.
         name: "A" to "E".
-        frames: named points of the tool frames: "wrist" and "tip".
+        frames: "wrist" and "tip" of the tool frames.
 
     Raises:
         UnknownName: no such configuration.
@@ -101,20 +100,19 @@ def configured(phase: Phase, name: str, frames: dict[str, Vector]) -> Phase:
 
 
 def relative(phase: Phase) -> Phase:
-    """The relative task: both arms give way where either did. Who moves stays as it is."""
+    """The relative task: both arms compliant where either was."""
     parts = tuple(part for part in PARTS if any(part in arm.compliant for arm in phase.arms))
     first, second = (replace(arm, compliant=parts) for arm in phase.arms)
     return replace(phase, arms=(first, second), mode="relative")
 
 
 def body(phase: Phase) -> Document:
-    """The part of a skill document that this kind writes: `frame` and `phases`."""
+    """`frame` and `phases` of a skill document."""
     frame = frame_at(phase.arms[0].center_of_compliance, axes="phase_start")
     return {"frame": frame, "phases": [_plain(asdict(phase))]}
 
 
 def _plain(value: Any) -> Any:
-    """Tuples as lists, as JSON gives them back."""
     if isinstance(value, dict):
         return {key: _plain(item) for key, item in value.items()}
     return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
@@ -124,22 +122,12 @@ def read_phase(document: Document) -> Phase:
     """The phase of a document.
 
     Raises:
-        InputError: not exactly one phase or two arms, or a value that makes no sense.
+        InputError: not exactly one phase or two arms, or an invalid value.
     """
     phases = document.get("phases", [])
     if len(phases) != 1:
         raise InputError("phases", f"two arms share one phase, this has {len(phases)}", "learn it again")
     phase = build(Phase, phases[0], "phases[0]")
-    _check(phase)
-    return phase
-
-
-def centers(document: Document) -> Float:
-    """(arms, 3) centres of compliance of a document, in each arm's tool frame [m]."""
-    return np.array([arm.center_of_compliance for arm in read_phase(document).arms])
-
-
-def _check(phase: Phase) -> None:
     where = "phases[0]"
     vectors = [phase.desired_direction, *phase.compliant_translation, *phase.compliant_rotation]
     if any(abs(float(norm(np.array(v))) - 1.0) > 0.01 for v in vectors):
@@ -156,4 +144,37 @@ def _check(phase: Phase) -> None:
             if part not in PARTS:
                 raise InputError(f"{where}.arms[{i}].compliant", str(UnknownName("part", part, PARTS)))
     if phase.mode == "relative" and set(phase.arms[0].compliant) != set(phase.arms[1].compliant):
-        raise InputError(f"{where}.arms", "a relative task gives way alike in both arms", "make `compliant` equal")
+        raise InputError(f"{where}.arms", "both arms are compliant alike in a relative task", "make `compliant` equal")
+    return phase
+
+
+def centers(document: Document) -> Float:
+    """(arms, 3) centres of compliance in each arm's tool frame [m]."""
+    return np.array([arm.center_of_compliance for arm in read_phase(document).arms])
+
+
+def describe(document: Document) -> list[str]:
+    """The task of the pair, then a line for each arm."""
+    phase = read_phase(document)
+    how = "as a relative task" if phase.mode == "relative" else "each arm for itself"
+    lines = [f"two arms approach along {_axis(phase.desired_direction)} at {1e3 * phase.speed:g} mm/s, {how}"]
+    parts = (("along", "translation", phase.compliant_translation), ("about", "rotation", phase.compliant_rotation))
+    for arm, name in zip(phase.arms, ("the arm with the tool", "the arm with the fixture"), strict=True):
+        free = [
+            f"{verb} {' and '.join(map(_axis, axes))}"
+            for part in arm.compliant for verb, of, axes in parts if of == part and axes
+        ]  # fmt: skip
+        gives = f"is compliant {' and '.join(free)}" if free else "is stiff"
+        point = ", ".join(f"{1e3 * x:g}" for x in arm.center_of_compliance)
+        share = f"{name} makes {100 * arm.share:g} % of the motion"
+        lines.append(f"{share} and {gives}; its centre of compliance is ({point}) mm")
+    return lines
+
+
+def _axis(vector: Vector) -> str:
+    """Name of a coordinate axis within 5 degrees, else the components."""
+    v = np.array(vector)
+    i = int(np.argmax(np.abs(v)))
+    if abs(v[i]) > np.cos(np.radians(5.0)):
+        return f"{'-' if v[i] < 0.0 else ''}{'xyz'[i]}"
+    return f"({v[0]:.2f}, {v[1]:.2f}, {v[2]:.2f})"

@@ -1,9 +1,8 @@
-"""`dual_peg`: a peg with a hemispherical tip in one arm's hand, its hole in the other's (two-arm LMC paper).
+"""World `dual_peg`: one arm holds a peg with a hemispherical tip, the other its hole (two-arm LMC paper).
 
-Published: peg radius 16.5 mm, length 80 mm, rounded tip, hole radius 0.25 mm more, both bolted to the wrists. Ours: the
-rounded tip is a hemisphere (a fillet of any radius would be as possible), hole 60 mm deep of 32 boxes, tip and
-mouth 0.15 m from the flanges, tools of 0.6 and 0.8 kg. The tip starts 1 mm above the mouth; it is inserted at 50 mm.
-A robot with one arm finds the hole standing still.
+Published: peg radius 16.5 mm, length 80 mm, rounded tip, hole radius 0.25 mm more. Assumed: a hemisphere, hole 60 mm
+deep of 32 boxes, tip and hole entrance 0.15 m from the flanges, tools of 0.6 and 0.8 kg. The tip starts 1 mm above the
+hole and is inserted at 50 mm. With one arm, the hole is fixed.
 """
 
 from __future__ import annotations
@@ -15,18 +14,14 @@ from numpy.typing import NDArray
 
 from skillframe.frames import Float, norm
 from skillframe.world.scene import Geom, Holder, Scene, State, Task, Tool
-from skillframe.world.shapes import TOOL_COLOUR, hole, shaft
-from skillframe.world.worlds.common import FLOOR, TOOL_DOWN, insertion, require, tilt_of
+from skillframe.world.shapes import FLOOR, TOOL_COLOUR, TOOL_DOWN, hole, insertion, require, shaft, tilt_of
 
-REACH = 0.15  # from the flange to tip and mouth [m]
-MASSES = (0.6, 0.8)  # of peg and hole with their mounts [kg]
+REACH = 0.15  # from the flange to tip and hole entrance [m]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DualPegParams:
-    """Parameters of `dual_peg`.
-
-    Ranges end where parts are too small for a gripper, or too large for an arm (our choice).
+    """Parameters of `dual_peg`, within sizes for a gripper and an arm.
 
     Attributes:
         radius: of the peg and its hemispherical tip [m, 0.1mm to 200mm].
@@ -48,7 +43,7 @@ class DualPegParams:
 
 
 def build(params: DualPegParams) -> Scene:
-    """The hole opens along the fixture's z axis. The goal is the tip in it, below `done_depth`, not below its floor."""
+    """The scene, its hole along the fixture's z axis, its goal the tip between `done_depth` and the floor."""
     require(
         "dual_peg",
         {
@@ -58,6 +53,11 @@ def build(params: DualPegParams) -> Scene:
         },
         params,
     )
+
+    half = 0.5 * params.length - params.radius
+    place = (0.0, 0.0, REACH - params.radius - half)
+    peg = Geom(kind="capsule", size=(params.radius, half), position=place, rgba=TOOL_COLOUR)
+    mount = shaft(0.012, -REACH, max(-params.depth, 0.012 - REACH))
 
     def distance(state: State) -> Float:
         return norm(state.tip.position - np.array([0.0, 0.0, -params.depth]))
@@ -69,9 +69,9 @@ def build(params: DualPegParams) -> Scene:
 
     return Scene(
         name="dual_peg",
-        fixture=(*hole(params.radius + params.clearance, params.depth, params.boxes, wall=0.025), _mount(params)),
-        tool=_peg_tool(params),
-        holder=Holder(tool=_tool((), MASSES[1], "mouth"), position=(0.0, 0.0, REACH)),
+        fixture=(*hole(params.radius + params.clearance, params.depth, params.boxes, wall=0.025), mount),
+        tool=_tool((peg, shaft(0.012, 0.012, REACH - params.length)), 0.6, "tip"),
+        holder=Holder(tool=_tool((), 0.8, "mouth"), position=(0.0, 0.0, REACH)),
         friction=params.friction,
         start_tip=(0.0, 0.0, 0.001),
         start_quaternion=TOOL_DOWN,
@@ -80,27 +80,13 @@ def build(params: DualPegParams) -> Scene:
         way=insertion(params.depth, params.radius),
         task=Task(
             direction=(0.0, 0.0, -1.0), aligned=TOOL_DOWN, hand="aligning",
-            starts=(_start(8.0, -0.006), _start(-8.0, 0.006)),
+            # tilted and offset so that the rim guides the tip
+            starts=tuple(
+                {"start.tilt_y": float(np.deg2rad(tilt)), "start.offset_x": offset}
+                for tilt, offset in ((8.0, -0.006), (-8.0, 0.006))
+            ),
         ),
     )  # fmt: skip
-
-
-def _start(tilt_deg: float, offset: float) -> dict[str, float]:
-    """A demonstration's start: tilted, and off to the side so that the rim leads the tip in."""
-    return {"start.tilt_y": float(np.deg2rad(tilt_deg)), "start.offset_x": offset}
-
-
-def _peg_tool(params: DualPegParams) -> Tool:
-    half = 0.5 * params.length - params.radius
-    peg = Geom(
-        kind="capsule", size=(params.radius, half), position=(0.0, 0.0, REACH - params.radius - half), rgba=TOOL_COLOUR
-    )
-    return _tool((peg, shaft(0.012, 0.012, REACH - params.length)), MASSES[0], "tip")
-
-
-def _mount(params: DualPegParams) -> Geom:
-    """What joins the hole's bottom to the flange that holds it, to be seen only."""
-    return shaft(0.012, -REACH, max(-params.depth, 0.012 - REACH))
 
 
 def _tool(geoms: tuple[Geom, ...], mass: float, end: str) -> Tool:

@@ -1,20 +1,19 @@
-"""A skill for two arms from demonstrations of one: one arm was led, the other stood still (as in the two-arm paper).
+"""Learn a skill for two arms from demonstrations in which one moved and the other stood still.
 
-What is learned is one linear motion with compliance, by whatever `lmc` learner the registry offers, in the tool's own
-attitude at the start of the phase. The coordinator then gives each arm its part of it: a configuration A to E, or the
-relative task. Speed, stiffness and lead are this plug-in's, not the learner's.
+The registry's `lmc` learner gives one linear motion with compliance in the tool's orientation at the start; a
+configuration A to E, or the relative task, divides it. Speed, stiffness and lead are this plug-in's.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from skillframe.config import build
 from skillframe.demonstration.record import Demonstration
-from skillframe.demonstration.together import common_frames
+from skillframe.document.frame import common_frames
 from skillframe.errors import InputError
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.extend.registry import registry
@@ -26,13 +25,12 @@ PRIMITIVE = "lmc"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """What `learn --set` can change. The other keys go to the learner of the primitive.
+    """Settings of `learn --set`, whose other keys go to the learner of the primitive.
 
     Attributes:
-        configuration: "A" to "E", which arm gives way in what: A the first about its wrist, B the first about the tip,
-            C the second, D both in rotation only, E both.
-        mode: "independent", or "relative" for the relative task. Any other setting is one of `lmc`, which finds the
-            push and the axes; speeds and stiffnesses are `dual_arm`'s own.
+        configuration: "A" to "E", the compliant arm: A the first about its wrist, B the first about the tip, C the
+            second, D both in rotation only, E both.
+        mode: "independent", or "relative" for the relative task.
     """
 
     configuration: str = "B"
@@ -43,14 +41,15 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     """A document's body from demonstrations of the arm that moves.
 
     Raises:
-        InputError: no direction is common to the demonstrations, or their axes were asked for in base.
+        InputError: demonstrations without a common direction, or axes of base.
         UnknownName: no such configuration, point or setting.
     """
     ours = {key: value for key, value in options.settings.items() if key in Settings.__dataclass_fields__}
     theirs = {key: value for key, value in options.settings.items() if key not in ours}
     settings = build(Settings, ours, "--set")
-    known = common_frames(demonstrations)  # without a tip of its own, it is the recorded tool point
-    frames = _frames(known)
+    known = common_frames(demonstrations)  # without a tip, the recorded tool point
+    origin: Vector = (0.0, 0.0, 0.0)
+    frames = {"wrist": origin, "tip": origin} | {k: (v[0], v[1], v[2]) for k, v in known.items()}
     at = options.at or ("tip" if "tip" in known else None)
     wanted = replace(options, at=at, axes="phase_start", settings=theirs)
     learner = registry().skill(PRIMITIVE).learn
@@ -59,12 +58,8 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     return body(relative(phase) if settings.mode == "relative" else phase)
 
 
-def _frames(known: Mapping[str, Sequence[float]]) -> dict[str, Vector]:
-    return {"wrist": (0.0, 0.0, 0.0), "tip": (0.0, 0.0, 0.0)} | {k: (v[0], v[1], v[2]) for k, v in known.items()}
-
-
 def phase_from(learned: Document, frames: dict[str, Vector], configuration: str) -> Phase:
-    """The two arms' phase from what one arm learned, axes in the tool's attitude at the start.
+    """The two arms' phase from a learned one, axes in the tool's orientation at the start.
 
     Raises:
         InputError: it has no desired direction.

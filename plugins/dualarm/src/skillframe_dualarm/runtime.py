@@ -1,18 +1,14 @@
-r"""Two arms under one impedance law, N trials at once.
+r"""Impedance control of two arms, N trials at once.
 
-Independent (as published, no central controller): each arm i obeys equation (1) at its own centre of compliance with
+Independent (as published): each arm i obeys equation (1) at its own centre of compliance with
 
     F_i = K_i (x_d,i - x_i) - D v,     x_d,1 = x_0,1 + s v_d,    x_d,2 = x_0,2        s <- s + nu dt  (lead limited)
 
-where K_i is zero along its compliant axes. If both arms are compliant along an axis, nothing holds the pair there: it
-can turn or drift as a whole. Relative (ours; in the words of cooperative task space, Chiacchio, Chiaverini, Siciliano
-1996): write the errors e_i = x_d,i - x_i as relative e_1 - e_2 and common (e_1 + e_2) / 2. Compliance is meant for the
-first, so the second keeps the stiffness that was taken away, K_c = K - K_i, with damping D_c:
+where K_i is zero along its compliant axes. If both are compliant along an axis, the pair can drift. Relative
+(cooperative task space, Chiacchio, Chiaverini, Siciliano 1996): of the errors e_i = x_d,i - x_i, only e_1 - e_2 is
+compliant; the common one keeps the stiffness K_c = K - K_i, with damping D_c:
 
     F_i += K_c (e_1 + e_2) / 2 + D_c (de_1 + de_2) / 2
-
-The same wrench on both arms does no work on relative motion, so alignment is as free as before. Each arm makes its
-share of the motion. Every row is computed by itself.
 """
 
 from __future__ import annotations
@@ -22,33 +18,31 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.control.impedance import pose_error
 from skillframe.extend.records import Document
-from skillframe.frames import Float, Pose, rotate
+from skillframe.frames import Float, Pose, dot, pose_error, rotate
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 from skillframe_dualarm.document import Arm, Phase, read_phase
 
 TOWARDS = np.array([1.0, -1.0])  # the arms move towards each other
-COMMON_DAMPING = np.array([50.0] * 3 + [3.0] * 3)  # [Ns/m, Nms/rad] ours: about critical for 600 N/m, 40 Nm/rad
-PUSHING = 0.5  # of the lead: less is not yet a push that could stall
+COMMON_DAMPING = np.array([50.0] * 3 + [3.0] * 3)  # [Ns/m, Nms/rad] critical for 600 N/m, 40 Nm/rad
 
 
 def build(document: Document) -> DualArm:
     """The coordinator of a document.
 
     Raises:
-        InputError: the phase is not as it should be.
+        InputError: the phase is invalid.
     """
     return DualArm(read_phase(document))
 
 
 def stiffnesses(phase: Phase, arm: Arm, turn: Float) -> tuple[Float, Float]:
-    """What an arm keeps and what compliance takes away, (N, 6, 6) each, base axes.
+    """Stiffness kept and removed by compliance, (N, 6, 6) each, base axes.
 
     Args:
         phase: the motion.
-        arm: which of its parts give way.
-        turn: (N, 3, 3) the arm's tool attitude at the start.
+        arm: its compliant parts.
+        turn: (N, 3, 3) the arm's tool orientation at the start.
     """
     kept, taken = np.zeros((len(turn), 6, 6)), np.zeros((len(turn), 6, 6))
     parts = (
@@ -65,10 +59,10 @@ def stiffnesses(phase: Phase, arm: Arm, turn: Float) -> tuple[Float, Float]:
 
 
 class DualArm(Skill):
-    """The coordinator. Observations and commands are (N, 2, ...).
+    """Coordinator of observations and commands (N, 2, ...).
 
     Args:
-        phase: what the arms do.
+        phase: of both arms.
     """
 
     def __init__(self, phase: Phase) -> None:
@@ -76,11 +70,11 @@ class DualArm(Skill):
         self._share = np.array([arm.share for arm in phase.arms])
 
     def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
-        """Take the measured poses as the first desired ones, and turn directions and axes into base."""
+        """Take the measured poses as the first desired ones, and rotate directions and axes into base."""
         n, phase = len(rngs), self._phase
         self._home = Pose(observation.pose.position.copy(), observation.pose.rotation.copy())
         forward = rotate(self._home.rotation[:, 0], np.broadcast_to(np.array(phase.desired_direction), (n, 3)))
-        self._direction = TOWARDS[:, None] * forward[:, None]  # (N, 2, 3) where each arm's motion goes
+        self._direction = TOWARDS[:, None] * forward[:, None]  # (N, 2, 3) direction of each arm
         gains = [stiffnesses(phase, arm, self._home.rotation[:, i]) for i, arm in enumerate(phase.arms)]
         self._impedance = Impedance(np.stack([kept for kept, _ in gains], axis=1))
         self._common = 0.5 * (gains[0][1] + gains[1][1])  # (N, 6, 6), one for both arms
@@ -95,37 +89,27 @@ class DualArm(Skill):
         self._first = True
 
     def step(self, observation: Observation) -> Command:
-        """Advance the arms towards each other and look whether the phase has ended."""
+        """Advance the arms towards each other and check for the end."""
         dt = 0.0 if self._first else observation.dt
         self._first = False
-        travel = np.vecdot(observation.pose.position - self._home.position, self._direction)  # (N, 2)
-        pushing = self._advance(dt, travel)
-        ahead = (self._progress[:, None] * self._share)[..., None]
-        pose = Pose(self._home.position + ahead * self._direction, self._home.rotation)
-        extra = self._hold_common(pose, observation) if self._phase.mode == "relative" else self._nothing
-        self._judge(observation.time[:, 0], travel.sum(-1), pushing)
-        return Command(pose, self._twist, self._impedance, extra, self._status.copy(), self._reason.copy())
-
-    def _advance(self, dt: float, travel: Float) -> NDArray[np.bool_]:
-        """Move on, no arm's desired pose further ahead of it than the lead. Says who pushes."""
+        travel = dot(observation.pose.position - self._home.position, self._direction)  # (N, 2)
         lead = self._phase.lead_force_n / self._phase.stiffness
         moving = self._share > 0.0
         limit = ((travel + lead)[:, moving] / self._share[moving]).min(-1)
         self._progress = np.minimum(self._progress + self._phase.speed * dt, limit)
         behind = (self._progress[:, None] * self._share - travel)[:, moving].max(-1)
-        pushing: NDArray[np.bool_] = behind >= PUSHING * lead
-        return pushing
-
-    def _hold_common(self, pose: Pose, observation: Observation) -> Float:
-        """The wrench (N, 2, 6), one for both arms, against motion of the pair as a whole."""
-        error = pose_error(pose, observation.pose).mean(1)
-        slip = (self._twist - observation.twist).mean(1)
-        wrench = (self._common @ error[..., None] + self._common_damping @ slip[..., None])[..., 0]
-        result: Float = np.repeat(wrench[:, None], 2, axis=1)
-        return result
+        ahead = (self._progress[:, None] * self._share)[..., None]
+        pose = Pose(self._home.position + ahead * self._direction, self._home.rotation)
+        extra = self._nothing
+        if self._phase.mode == "relative":  # a wrench against common motion, the same for both arms
+            error = pose_error(pose, observation.pose).mean(1)
+            slip = (self._twist - observation.twist).mean(1)
+            common = (self._common @ error[..., None] + self._common_damping @ slip[..., None])[..., 0]
+            extra = np.repeat(common[:, None], 2, axis=1)
+        self._judge(observation.time[:, 0], travel.sum(-1), behind >= 0.5 * lead)  # less is no push that could stall
+        return Command(pose, self._twist, self._impedance, extra, self._status.copy(), self._reason.copy())
 
     def _judge(self, time: Float, approach: Float, pushing: NDArray[np.bool_]) -> None:
-        """End the trials that have stalled or run out of time. The first reason stays."""
         phase = self._phase
         gained = (approach > self._best + phase.stall_m) | ~pushing
         self._best = np.where(gained, approach, self._best)

@@ -3,8 +3,7 @@
     import gymnasium, skillframe_gym
     env = gymnasium.make("skillframe/peg_in_hole-v0")
 
-Importing this registers `skillframe/WORLD-v0` for every installed world. Gymnasium looks for no plug-ins itself.
-`settings` says what an environment takes, `episodes` runs trials, `environments` has the two classes.
+The import registers `skillframe/WORLD-v0` for every installed world.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ NAMESPACE = "skillframe"
 
 
 def names() -> list[str]:
-    """The environments of the installed worlds, "skillframe/peg_in_hole-v0" ..."""
+    """Names of the environments, "skillframe/peg_in_hole-v0" ..."""
     return [f"{NAMESPACE}/{world}-v0" for world in registry().names("world")]
 
 

@@ -1,12 +1,12 @@
-"""`WorldEnv` and `WorldVectorEnv`: a world as a Gymnasium environment, one trial or many in one batch.
+"""`WorldEnv` and `WorldVectorEnv`: a world as a Gymnasium environment, one trial or a batch.
 
-With d the distance to the world's goal, an angle of 1 rad counted as 0.1 m, a step's reward is
+With d the distance to the world's goal, 1 rad counted as 0.1 m, a step's reward is
 
     progress:  (d_before - d_after) / 10 mm  + 10 if the trial succeeded, - 10 if it ended otherwise but by the clock
     sparse:    1 if the trial succeeded, else 0
 
-The first is a difference of a potential (Ng, Harada and Russell 1999, gamma = 1) plus the end's worth; its figures are
-our choice. Success, failure and their words are those of `run`: the world's goal and the robot's limits.
+The first is a difference of a potential (Ng, Harada and Russell 1999, gamma = 1) plus the value of the end. Success and
+failure are those of `run`.
 """
 
 from __future__ import annotations
@@ -20,11 +20,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from skillframe.api.tasks import Robot, Settings, World, robot_of, scene_of
+from skillframe.api.inputs import Robot, Settings, World, robot_of, scene_of
 from skillframe.demonstration.record import resolve_point
 from skillframe.errors import InputError, SkillframeError, UnknownName
-from skillframe.execution.prepare import drive_maker
-from skillframe.execution.setup import Setup
+from skillframe.execution.drive import Setup
 from skillframe.frames import Float
 from skillframe_gym.episodes import Cohort, Seen
 from skillframe_gym.pictures import Camera
@@ -40,7 +39,7 @@ class Task:
     Args:
         world: a name, a fixture file, or a scene.
         robot: a name, a robot.toml or its folder, or a loaded robot.
-        set: what differs from the nominal in every trial, as with `run`.
+        set: deviations from the nominal in every trial, as with `run`.
         settings: fields of `EnvSettings`.
     """
 
@@ -51,15 +50,15 @@ class Task:
             raise InputError("environment", str(error).partition("() ")[2], "see EnvSettings") from None
         self.scene, self._fixed = scene_of(world, set, depth=4)
         model = robot_of(robot)
-        point = np.zeros(3) if model.spec.hydraulic else resolve_point("tip", self.scene.tool.frames)
+        point = np.zeros(3) if model.spec.own_law else resolve_point("tip", self.scene.tool.frames)
         self.setup = Setup(
-            robot=model, scene=self.scene, center_of_compliance=point, make_drive=drive_maker(model),
+            robot=model, scene=self.scene, center_of_compliance=point,
             stop_when=self.scene.goal,
         )  # fmt: skip
         self._axes = self.settings.axes
 
     def begin(self, rngs: Sequence[np.random.Generator]) -> Cohort:
-        """Trials at their starts. Each takes a child of its own environment's generator, so none disturbs another."""
+        """Trials at their starts, each with a child of its environment's generator, so that none affects another."""
         children = [rng.spawn(2) for (rng,) in ([parent.spawn(1)[0]] for parent in rngs)]
         drawn = [self._drawn(first) for first, _ in children]
         names = sorted({name for trial in drawn for name in trial})
@@ -67,13 +66,13 @@ class Task:
         return Cohort(self.setup, self.settings, draws, [second for _, second in children])
 
     def _drawn(self, rng: np.random.Generator) -> dict[str, Any]:
-        """Quantities of one trial: what is fixed, over what is drawn, over the start."""
+        """Quantities of one trial: fixed ones over sampled ones over the start."""
         starts = self.scene.task.starts if self.settings.starts == "task" else ({},)
         start = starts[int(rng.integers(len(starts)))]
         return {**start, **{name: axis.draw(rng) for name, axis in self._axes.items()}, **self._fixed}
 
     def reward(self, before: Float, seen: Seen) -> Float:
-        """(N,) of a step that began at distances `before` (N,) and ended as seen."""
+        """(N,) reward of a step from distances `before` (N,) to `seen`."""
         if self.settings.reward == "sparse":
             return seen.success.astype(float)
         worth = WORTH * (seen.success.astype(float) - (seen.ended & ~seen.success & ~seen.by_time))
@@ -86,12 +85,12 @@ class WorldEnv(gymnasium.Env[Obs, NDArray[np.float32]]):
     Args:
         world: a name, a fixture file, or a scene.
         robot: a name, a robot.toml or its folder, or a loaded robot.
-        set: what differs from the nominal in every trial, {"world.friction": 0.2}, as with `run`.
+        set: deviations from the nominal in every trial, {"world.friction": 0.2}, as with `run`.
         render_mode: "rgb_array": `render` draws the tool over the fixture cut open; None: nothing is drawn.
         settings: fields of `EnvSettings`.
 
     Raises:
-        SkillframeError: something given cannot be used; says what, where, and what to do.
+        SkillframeError: an argument cannot be used.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 20}  # noqa: RUF012  (Gymnasium's own form)
@@ -110,7 +109,11 @@ class WorldEnv(gymnasium.Env[Obs, NDArray[np.float32]]):
         self._camera: Camera | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Obs, dict[str, Any]]:
-        """Begin the next trial. `options` has none."""
+        """Begin the next trial, without `options`.
+
+        Raises:
+            InputError: it begins in collision. The ranges of the settings apply, so it is not sampled again.
+        """
         super().reset(seed=seed)
         self._cohort, self._camera = self.task.begin([self.np_random]), None
         self._seen = self._cohort.see()
@@ -121,7 +124,8 @@ class WorldEnv(gymnasium.Env[Obs, NDArray[np.float32]]):
         """Tick to the next action.
 
         Raises:
-            SkillframeError: there is no trial, or it is over. InputError: an action that is not finite.
+            SkillframeError: there is no trial, or it is over.
+            InputError: an action that is not finite.
         """
         if self._cohort is None or self._told:
             raise SkillframeError("the episode is over or was not begun; call reset() first")
@@ -134,7 +138,7 @@ class WorldEnv(gymnasium.Env[Obs, NDArray[np.float32]]):
         return _row(seen, 0), float(self.task.reward(before, seen)[0]), self._told and not late, late, info
 
     def render(self) -> Any:
-        """A picture (240, 320, 3) of where the trial stands, if `render_mode` is "rgb_array", else None.
+        """Picture (240, 320, 3) of the trial if `render_mode` is "rgb_array", else None.
 
         Raises:
             SkillframeError: there is no trial.
@@ -149,10 +153,10 @@ class WorldEnv(gymnasium.Env[Obs, NDArray[np.float32]]):
 
 
 class WorldVectorEnv(VectorEnv[Obs, NDArray[np.float32], NDArray[Any]]):
-    """N trials in one batch, each the same to the last bit as in a `WorldEnv` of its own seed.
+    """N trials in one batch, each bitwise equal to a `WorldEnv` of its own seed.
 
-    A trial that ended begins again in the step after, whose action it ignores (Gymnasium's `NEXT_STEP`). Trials that
-    begin together tick together; the more the beginnings are spread, the smaller the batches.
+    An ended trial restarts in the next step and ignores its action (Gymnasium's `NEXT_STEP`). Trials that begin
+    together form a batch; spread starts make batches smaller.
 
     Args:
         num_envs: N.
@@ -174,7 +178,7 @@ class WorldVectorEnv(VectorEnv[Obs, NDArray[np.float32], NDArray[Any]]):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Obs, dict[str, Any]]:
-        """Begin N trials. Seed s is s, s + 1, ... for the trials, as in Gymnasium's own vector environments."""
+        """Begin N trials, with seeds s, s + 1, ... as in Gymnasium's vector environments."""
         seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else seed
         if seeds is not None and len(seeds) != self.num_envs:
             raise InputError("seed", f"holds {len(seeds)} seeds for {self.num_envs} trials", "give one for each")
@@ -191,10 +195,11 @@ class WorldVectorEnv(VectorEnv[Obs, NDArray[np.float32], NDArray[Any]]):
     def step(
         self, actions: NDArray[np.float32]
     ) -> tuple[Obs, Float, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:  # fmt: skip
-        """Tick all trials to their next action. Those that had ended begin again.
+        """Tick all trials to their next action, and restart those that had ended.
 
         Raises:
-            SkillframeError: no trial was begun. InputError: an action that is not finite.
+            SkillframeError: no trial was begun.
+            InputError: an action that is not finite.
         """
         if not self._rngs:
             raise SkillframeError("no episode was begun; call reset() first")
@@ -215,14 +220,12 @@ class WorldVectorEnv(VectorEnv[Obs, NDArray[np.float32], NDArray[Any]]):
         return self._copied(), reward, ended & ~late, late, infos
 
     def _begin(self, rows: NDArray[np.int64]) -> None:
-        """Begin some trials as a batch of their own."""
         live = np.ones(len(rows), dtype=bool)
         group = _Group(rows, self.task.begin([self._rngs[i] for i in rows]), live)
         self._groups.append(group)
         self._put(rows, group.cohort.see(), live)
 
     def _put(self, rows: NDArray[np.int64], seen: Seen, live: NDArray[np.bool_]) -> None:
-        """Take in where trials stand that have not been told as ended."""
         self._distance[rows] = seen.distance[live]
         for name, values in seen.observation.items():
             self._observed[name][rows] = values[live]
@@ -232,7 +235,7 @@ class WorldVectorEnv(VectorEnv[Obs, NDArray[np.float32], NDArray[Any]]):
 
 
 class _Group(NamedTuple):
-    """Trials that tick together, at rows of the environment, and which of them have not been told as ended."""
+    """Trials of one batch, their rows, and which ends are not yet reported."""
 
     rows: NDArray[np.int64]
     cohort: Cohort

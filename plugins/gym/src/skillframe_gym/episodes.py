@@ -1,8 +1,7 @@
-"""Trials of a world that are steered from outside, a step of many ticks at a time, in the loop that `run` has.
+"""Trials of a world steered from outside, a step of many ticks at a time, in the loop of `run`.
 
-A cohort is the trials that began together. They tick in lock-step, and a trial's outcome does not depend, to the last
-bit, on how many others are beside it. A trial ends as in `run`: by a limit, by the clock, or when the world's goal
-holds, which is looked at every 10 ms.
+A cohort is a set of trials that began together. They tick in lock-step, and a trial's outcome does not depend, to the
+last bit, on the others. A trial ends by a limit, by the clock, or at the world's goal, which is checked every 10 ms.
 """
 
 from __future__ import annotations
@@ -13,28 +12,27 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.control.endings import Ended
 from skillframe.errors import InputError
-from skillframe.execution.executor import Loop, begin
-from skillframe.execution.setup import Setup
+from skillframe.execution.drive import Setup
+from skillframe.execution.executor import Loop, begin, require_starts
+from skillframe.execution.recorder import ratio
 from skillframe.frames import Float, Pose, quaternion_from_matrix, rotation_matrix
-from skillframe.skill import Command, Impedance, Observation, Skill, no_reasons
-from skillframe.world.rates import ratio
+from skillframe.skill import Command, Ended, Impedance, Observation, Skill, no_reasons
 from skillframe_gym.settings import LARGEST, EnvSettings
 
 LEVER_M = 0.1
-"""[m/rad] that makes an angle to the goal a distance; our choice, the length of a small part."""
+"""Distance per angle to the goal [m/rad]: the length of a small part."""
 
 
 class Seen(NamedTuple):
-    """Where some trials stand after a step. Every array has a row a trial.
+    """State of trials after a step, a row a trial.
 
     Attributes:
         observation: name to (N, ...), of `settings.observation_space`.
         distance: to the goal, the angle counted with `LEVER_M` [m].
         success: of `Result`; False while a trial runs.
         ended: the trial is over.
-        by_time: it is over because of the clock alone.
+        by_time: it ended by the clock alone.
     """
 
     observation: dict[str, Float]
@@ -45,7 +43,7 @@ class Seen(NamedTuple):
 
 
 class Steered(Skill):
-    """Holds the target that it was given last. At the start that is where the tool stands."""
+    """Holds the last target, at the start the tool's pose."""
 
     def __init__(self, settings: EnvSettings) -> None:
         self._settings = settings
@@ -58,14 +56,14 @@ class Steered(Skill):
         self.steer(np.zeros((self._count, self._settings.action_space().shape[0])))
 
     def steer(self, actions: Float) -> None:
-        """Take actions (N, 6 or 12), between -1 and 1, seen from the last observation."""
+        """Take actions (N, 6 or 12), between -1 and 1, relative to the last observation."""
         position, rotation = self.seen.pose
         turn = rotation_matrix(self._settings.reach_rad * actions[:, 3:6])
         self._pose = Pose(position + self._settings.reach_m * actions[:, :3], turn @ rotation)
         self._impedance = Impedance(self._settings.gains(actions))
 
     def step(self, observation: Observation) -> Command:
-        """The target."""
+        """The command to the target."""
         self.seen = observation
         still = self._still
         return Command(self._pose, still, self._impedance, still, self._running, self._reasons)
@@ -81,6 +79,7 @@ class Cohort:
         rngs: one generator per trial.
 
     Raises:
+        InputError: a trial begins in collision.
         SkillframeError: as `skillframe.execution.executor.simulate`.
     """
 
@@ -95,6 +94,7 @@ class Cohort:
         with _diverging_is_no_warning():
             self._loop: Loop = begin(self._skill, setup, draws, rngs)
             self._loop.prepare()
+            require_starts(self._loop.outcomes.ended_by, self._loop.outcomes.reason)
             self._loop.tick(0)
         self._tick, self.count = 1, len(rngs)
         self._shown = self._observed()
@@ -124,18 +124,18 @@ class Cohort:
                 self._loop.time_over(self._last, self._last_s)
 
     def see(self) -> Seen:
-        """Where the trials stand. What is observed is as old as a tick, as a skill's is."""
+        """State of the trials, observed with a delay of a tick, as by a skill."""
         ended = np.ones(self.count, dtype=bool)
         ended[self._loop.active] = False
         outcomes = self._loop.outcomes
         far, turned = self._loop.setup.scene.goal_error(self._loop.plant.tip_state())
         by_time = ended & (outcomes.ended_by == Ended.TIME.value)
-        if self._running != len(self._loop.active):  # sentences for every trial are made when one ended, not each step
+        if self._running != len(self._loop.active):  # sentences are made only when a trial ended
             self._running, self._result = len(self._loop.active), self._loop.result()
         return Seen(self._shown, far + LEVER_M * turned, self._result.success & ended, ended, by_time)
 
     def told(self, i: int) -> dict[str, Any]:
-        """Outcome of trial i, which has ended and was seen, as `run` tells it."""
+        """Outcome of the ended trial i, as of `run`."""
         result = self._result
         return {
             "is_success": bool(result.success[i]), "failure": str(result.failure[i]), "reason": str(result.reason[i]),
@@ -145,12 +145,12 @@ class Cohort:
         }  # fmt: skip
 
     def tip(self, i: int) -> Pose:
-        """Pose of trial i's tip in the true fixture frame, for pictures: nothing observes it."""
+        """Pose of trial i's tip in the true fixture frame, for pictures."""
         position, rotation = self._loop.plant.tip_state().tip
         return Pose(position[i], rotation[i])
 
     def _show(self, rows: NDArray[np.int64]) -> None:
-        """Keep what some trials observe now. Sensors of trials that have ended go on reading beside the others."""
+        """Store the observations of some trials, while sensors of ended trials go on."""
         for name, values in self._observed().items():
             self._shown[name][rows] = values[rows]
 

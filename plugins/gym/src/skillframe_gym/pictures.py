@@ -1,20 +1,20 @@
-"""What an environment draws: the tool over the fixture cut open, as on the page of a run, by the page's own renderer.
+"""Pictures of an environment: the tool over the fixture cut open, by the run page's renderer.
 
-The robot's links are not drawn, and neither is what the fixture's parts do.
+The robot's links and moving fixture parts are not drawn.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from skillframe_reports.scene_picture import View
 
+from skillframe.execution.recorder import geom_json
 from skillframe.frames import Pose
-from skillframe.reports.still import View
-from skillframe.world.drawing import geom_json
 from skillframe.world.scene import Scene
 
 WIDTH, HEIGHT = 320, 240
-"""Pixels; our choice."""
+"""Pixels."""
 
 
 class Camera:

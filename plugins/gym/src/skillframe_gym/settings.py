@@ -1,16 +1,15 @@
-"""What an environment takes, what it shows and what it is told: the settings, and both spaces.
+"""Settings of an environment, and its action and observation spaces.
 
-An action of six numbers between -1 and 1 moves the target of the impedance law, seen from where the tool was when the
-observation was made:
+An action of six numbers between -1 and 1 moves the target of the impedance controller from the observed tool pose:
 
     x_d = x + reach_m a[0:3]        R_d = exp(reach_rad a[3:6]) R        base axes                      (1)
 
-so the law's push is bounded by stiffness times reach, 20 N and 5 Nm as shipped. With `variable_stiffness` six more
-numbers choose the diagonal of the stiffness along the base axes, on a logarithmic scale between two bounds:
+so the push is at most stiffness times reach, 20 N and 5 Nm by default. With `variable_stiffness` six more numbers
+choose the diagonal of the stiffness along the base axes, logarithmic between two bounds:
 
     K = low (high / low)^((a + 1) / 2)                                                                 (2)
 
-Damping is the controller's own critical damping. Bounds and scales are our choice.
+The controller's damping is critical.
 """
 
 from __future__ import annotations
@@ -23,17 +22,17 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from skillframe.campaign.axes import Axis, parse_axis
+from skillframe.campaign.sampling import Axis, parse_axis
 from skillframe.errors import InputError, UnknownName
+from skillframe.extend.drives import quantities, unknown
 from skillframe.frames import Float
-from skillframe.world.quantities import QUANTITIES
 
-ROBOTS = {"pallets": "hiab_xs031"}
-"""The robot of an environment where it is not the Panda, by world."""
+ROBOTS = {"pallets": "hiab_xs031", "edge": "free_tool"}
+"""Robot by world, where it is not the Panda."""
 LARGEST = {"position": 100.0, "quaternion": 1.0, "twist": 1e3, "wrench": 1e6}
-"""Bounds of what is observed [m, 1, m/s and rad/s, N and Nm], at which values are cut that a diverging trial shows."""
+"""Bounds of observations [m, 1, m/s and rad/s, N and Nm], to which a diverging trial is clipped."""
 SOFTEST, STIFFEST = np.repeat([100.0, 5.0], 3), np.repeat([3000.0, 150.0], 3)
-"""(6,) ends of the scale of `variable_stiffness` [N/m, Nm/rad]; our choice, between a soft hand and a stiff arm."""
+"""(6,) bounds of `variable_stiffness` [N/m, Nm/rad]."""
 INDEPENDENT = ("uniform", "normal", "choice")
 STARTS = ("task", "nominal")
 REWARDS = ("progress", "sparse")
@@ -46,13 +45,12 @@ class EnvSettings:
     Attributes:
         rate_hz: actions a second; the controller's rate is a multiple of it.
         duration_s: longest episode [simulated s]; more where the robot's interface is slow, as with `run`.
-        reach_m, reach_rad: how far an action moves the target at most, along or about each base axis.
-        stiffness: of the law, along and about every axis [N/m, Nm/rad].
-        variable_stiffness: actions have six more numbers, which choose the stiffness.
-        reward: "progress": the way to the goal that a step made, or "sparse"; `environments` has the equations.
-        starts: "task": one of the starts from which the world's demonstrations begin, at random; "nominal": the start
-            of a plain `run`.
-        vary: what differs from trial to trial, `{"fixture.tilt_y": {"uniform": [-0.1, 0.1]}}`, as in campaign.toml.
+        reach_m, reach_rad: largest motion of the target by an action, along or about each base axis.
+        stiffness: along and about every axis [N/m, Nm/rad].
+        variable_stiffness: actions have six more numbers for the stiffness.
+        reward: "progress" towards the goal, or "sparse"; `environments` has the equations.
+        starts: "task": a random start of the world's demonstrations; "nominal": the start of a plain `run`.
+        vary: variation between trials, `{"fixture.tilt_y": {"uniform": [-0.1, 0.1]}}`, as in campaign.toml.
 
     Raises:
         InputError, UnknownName: a value that cannot be used.
@@ -81,11 +79,11 @@ class EnvSettings:
 
     @property
     def axes(self) -> dict[str, Axis]:
-        """What varies, by name, in the order in which it is drawn."""
+        """Varied quantities by name, in sampling order."""
         axes = {name: parse_axis(value, f"vary.{name}") for name, value in sorted((self.vary or {}).items())}
         for name, axis in axes.items():
-            if name not in QUANTITIES:
-                raise UnknownName("quantity", name, QUANTITIES, where="vary")
+            if name not in quantities():
+                raise unknown(name, quantities(), "vary")
             if axis.kind not in INDEPENDENT:
                 raise InputError(f"vary.{name}", f"{axis.kind} is a design of campaigns", "draw it: uniform, normal")
         return axes
@@ -95,7 +93,7 @@ class EnvSettings:
         return spaces.Box(-1.0, 1.0, (12 if self.variable_stiffness else 6,), np.float32)
 
     def gains(self, actions: Float) -> Float:
-        """(N, 6, 6) stiffness that actions (N, 6 or 12) ask for."""
+        """(N, 6, 6) stiffness of actions (N, 6 or 12)."""
         if not self.variable_stiffness:
             return np.broadcast_to(np.diag(np.repeat(self.stiffness, 3)), (len(actions), 6, 6))
         diagonal = SOFTEST * (STIFFEST / SOFTEST) ** ((actions[:, 6:] + 1.0) / 2.0)
@@ -104,10 +102,10 @@ class EnvSettings:
 
 
 def observation_space() -> spaces.Dict:
-    """What a skill sees, at the tool's tip, in base axes.
+    """Observations of a skill at the tool's tip, in base axes.
 
-    `position` [m] and `quaternion` (x, y, z, w) of the tip, `twist` [m/s, rad/s] of it, and `wrench` [N, Nm]: force and
-    torque of the environment on the tool at the tip, filtered and tared as the robot's own sensor reads them.
+    `position` [m] and `quaternion` (x, y, z, w) of the tip, its `twist` [m/s, rad/s], and `wrench` [N, Nm] of the
+    environment on the tool at the tip, filtered and tared as by the robot's sensor.
     """
     sizes = {"position": 3, "quaternion": 4, "twist": 6, "wrench": 6}
     return spaces.Dict({k: spaces.Box(-LARGEST[k], LARGEST[k], (n,), np.float64) for k, n in sizes.items()})

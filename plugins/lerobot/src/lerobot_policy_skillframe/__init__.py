@@ -1,7 +1,7 @@
-"""skillframe's learned skills as a policy of LeRobot, which imports this package by the beginning of its name.
+"""skillframe's skills as a policy of LeRobot, which imports this package by its name's prefix.
 
-`following` turns a skill into actions and knows nothing of LeRobot. `configuration_skillframe`, `modeling_skillframe`
-and `processor_skillframe` have the names that LeRobot looks for. `environments` has the worlds under LeRobot's names.
+`following` makes actions of a skill without LeRobot. `configuration_skillframe`, `modeling_skillframe` and
+`processor_skillframe` have the names that LeRobot expects, `environments` the worlds under its names.
 """
 
 from __future__ import annotations

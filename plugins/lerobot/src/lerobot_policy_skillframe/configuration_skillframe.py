@@ -1,7 +1,7 @@
-"""`SkillframeConfig`: what LeRobot has to know of a skill to run it as a policy.
+"""`SkillframeConfig`: settings of a skill as a policy of LeRobot.
 
-LeRobot finds the policy and its processors by names: this module's with `modeling_` and `processor_` in place of
-`configuration_`, the class's with `Policy` in place of `Config`.
+LeRobot finds policy and processors by names: `modeling_` and `processor_` for this module's `configuration_`, `Policy`
+for the class's `Config`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from skillframe.errors import InputError
 
 OBSERVED_STATE, OBSERVED_WRENCH, ACTION = "observation.state", "observation.wrench", "action"
 STATE_OF_ENV = "observation.environment_state"
-"""Where the wrench is looked for as well: LeRobot's own loop hands on no other vector of an environment."""
+"""Alternative name of the wrench, the only other vector that LeRobot's own loop passes on."""
 NOT_TRAINED = "is no way to learn a skill", "learn it with: skillframe learn DEMONSTRATION ... --out NAME.skill.json"
 
 
@@ -28,12 +28,13 @@ class SkillframeConfig(PreTrainedConfig):  # type: ignore[misc]
     """A skill as a policy.
 
     Attributes:
-        skill: path of the skill file; not needed where a saved policy is loaded, which holds it.
-        point: of the tool, where state and wrench are observed and the law acts: a name of the file, or "x,y,z" [m].
-        coc: centre of compliance, in the same words; None as learned.
-        rate_hz, reach_m, reach_rad, stiffness, variable_stiffness: those of the environment whose actions are wanted,
-            as in `skillframe_gym.settings.EnvSettings`.
-        seed: of skills that draw.
+        skill: path of the skill file; a saved policy holds it.
+        point: of the tool, where state and wrench are observed and the environment's controller acts: a name of the
+            file, or "x,y,z" [m].
+        coc: centre of compliance, likewise; None as learned.
+        rate_hz, reach_m, reach_rad, stiffness, variable_stiffness: those of the environment, as in
+            `skillframe_gym.settings.EnvSettings`.
+        seed: of random skills.
     """
 
     input_features: dict[str, PolicyFeature] | None = field(default_factory=dict)
@@ -51,7 +52,7 @@ class SkillframeConfig(PreTrainedConfig):  # type: ignore[misc]
     push_to_hub: bool = False
 
     def __post_init__(self) -> None:
-        """Fill in what is observed and what comes out, where nobody has said it.
+        """Fill in missing input and output features.
 
         Raises:
             InputError: a setting that no environment has.
@@ -82,12 +83,12 @@ class SkillframeConfig(PreTrainedConfig):  # type: ignore[misc]
 
     @property
     def action_delta_indices(self) -> None:
-        """Nothing is trained, so no actions of a data set are wanted."""
+        """Nothing is trained, so no actions are needed."""
         return None
 
     @property
     def reward_delta_indices(self) -> None:
-        """Nothing is trained, so no rewards are wanted."""
+        """Nothing is trained, so no rewards are needed."""
         return None
 
     def get_optimizer_preset(self) -> Any:
@@ -99,13 +100,13 @@ class SkillframeConfig(PreTrainedConfig):  # type: ignore[misc]
         raise InputError("training by LeRobot", *NOT_TRAINED)
 
     def get_scheduler_preset(self) -> None:
-        """There is none."""
+        """None."""
 
     def validate_features(self) -> None:
         """Refuse features of another size.
 
         Raises:
-            InputError: the state, the wrench or the action has another number of numbers.
+            InputError: the state, the wrench or the action has another size.
         """
         for name, size in ((OBSERVED_STATE, STATE), (OBSERVED_WRENCH, WRENCH)):
             feature = (self.input_features or {}).get(name)

@@ -1,7 +1,7 @@
-"""skillframe's worlds as LeRobot's environments, so that `make_env` and `make_policy` know one from its name.
+"""skillframe's worlds as LeRobot's environments, for `make_env` and `make_policy`.
 
-LeRobot's own loop hands on two vectors of an environment, under names of its own: `agent_pos`, which becomes
-`observation.state`, and `environment_state`. The first is the pose, the second the wrench.
+LeRobot's loop passes on two vectors: `agent_pos`, which becomes `observation.state` (the pose), and `environment_state`
+(the wrench).
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class SkillframeEnv(EnvConfig):  # type: ignore[misc]
         task: "WORLD-v0".
         fps: actions a second.
         episode_length: most actions of an episode.
-        settings: what else `skillframe_gym.environments.WorldEnv` takes: robot, set, vary, starts ...
+        settings: other arguments of `skillframe_gym.environments.WorldEnv`: robot, set, vary, starts ...
     """
 
     task: str | None = "peg_in_hole-v0"
@@ -56,18 +56,18 @@ class SkillframeEnv(EnvConfig):  # type: ignore[misc]
 
     @property
     def package_name(self) -> str:
-        """The namespace of the environments' names."""
+        """Namespace of the environments' names."""
         return NAMESPACE
 
     @property
     def gym_kwargs(self) -> dict[str, Any]:
-        """What `gymnasium.make` is given."""
+        """Arguments of `gymnasium.make`."""
         most = {"max_episode_steps": self.episode_length, "duration_s": self.episode_length / self.fps}
         return {**most, "rate_hz": float(self.fps), "render_mode": "rgb_array", **self.settings}
 
 
 class Renamed(gymnasium.ObservationWrapper[Any, Any, Any]):
-    """A world that shows its pose and wrench under LeRobot's names, as float32."""
+    """A world with pose and wrench under LeRobot's names, as float32."""
 
     metadata = WorldEnv.metadata
 

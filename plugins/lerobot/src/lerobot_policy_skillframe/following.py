@@ -1,15 +1,14 @@
-r"""A skill that is asked at the rate of a policy, and answers with actions of skillframe's Gymnasium environments.
+r"""A skill at the rate of a policy, with actions of skillframe's Gymnasium environments.
 
-A skill wants a pose and an impedance at its centre of compliance. An environment's action moves the target of a law of
-its own, seen from the pose that was observed. At that moment both laws push alike if, taken at the observed point,
+An action moves the target of the environment's own impedance from the observed pose. It pushes as the skill does if, at
+the observed point,
 
     D = K_env^-1 (K e + F_ff)                                                               (1)
 
-where e is the way from the observed to the desired pose [m, rad] and D the action's way. Between two actions the law is
-the environment's, so directions in which the skill gives way are held until the next action, and then let go. A push
-beyond the reach is shortened and keeps its direction. With `variable_stiffness` K_env is the diagonal of K at the
-observed point, within the environment's bounds. The damping of a moving target, D_s v_d, is left out, as an environment
-has none. All of this is our choice.
+where e is the way from the observed to the desired pose [m, rad] and D the action's. Between actions the environment's
+stiffness holds, also where the skill is compliant. A push beyond the reach is shortened. With `variable_stiffness`
+K_env is the diagonal of K within the environment's bounds. D_s v_d is left out, as an environment has no damping of a
+moving target.
 """
 
 from __future__ import annotations
@@ -30,15 +29,15 @@ from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, 
 from skillframe.skill import Command, Observation, Skill, Status
 
 STATE, WRENCH = 7, 6
-"""Numbers of what is observed: position and quaternion x, y, z, w of a point of the tool in base, and its wrench."""
+"""Sizes of the observation: position and quaternion x, y, z, w of a point of the tool in base, and its wrench."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Points:
-    """Points of the tool frame, as names that the skill file knows or as "x,y,z" [m].
+    """Points of the tool frame, as names of the skill file or "x,y,z" [m].
 
     Attributes:
-        observed: where state and wrench are given and the environment's law acts.
+        observed: point of state, wrench and the environment's control.
         compliant: centre of compliance; None as learned.
     """
 
@@ -47,20 +46,20 @@ class Points:
 
 
 class Following:
-    """A skill that answers states and wrenches with actions, for as many trials as it is given.
+    """A skill that maps states and wrenches to actions, for N trials.
 
     Args:
         document: a skill file's, checked.
-        settings: of the environment whose actions are wanted: rate, reaches, stiffness.
+        settings: rate, reaches and stiffness of the environment.
         points: of the tool.
-        seed: of skills that draw; every reset draws anew.
+        seed: of random skills, which sample anew at every reset.
 
     Attributes:
         status: (N,) `Status` of each trial; empty before the first action.
-        reason: (N,) why a trial's skill ended, in words.
+        reason: (N,) why a trial's skill ended.
 
     Raises:
-        InputError, UnknownName: a skill for several arms, one that cannot be built, or a point that nobody names.
+        InputError, UnknownName: a skill for several arms, one that cannot be built, or an unknown point.
     """
 
     def __init__(self, document: Document, settings: EnvSettings, points: Points, seed: int = 0) -> None:
@@ -73,7 +72,7 @@ class Following:
         center = frame.center_of_compliance if named is None else resolve_point(named, frame.points)
         self._shift, self.settings = center - observed, settings
         self._document, self._rng = with_center(document, center.tolist()), np.random.default_rng(seed)
-        self._build()  # so that a skill that cannot be built is refused now
+        self._build()  # refuse a skill that cannot be built now
         self.reset()
 
     def _build(self) -> Skill:
@@ -82,19 +81,19 @@ class Following:
             return self._kind.build(self._document)
 
     def reset(self) -> None:
-        """Forget the trials. The next observation begins new ones."""
+        """Forget the trials, so that the next observation begins new ones."""
         self._skill: Skill | None = None
         self.status, self.reason = np.zeros(0, np.int64), np.zeros(0, dtype=object)
 
     def act(self, state: Float, wrench: Float) -> Float:
-        """Actions (N, 6 or 12) for what is observed now, one step of the environment after the last.
+        """Actions (N, 6 or 12) for an observation, one environment step after the last.
 
         Args:
             state: (N, 7) position [m] and quaternion x, y, z, w of the observed point in base.
             wrench: (N, 6) of the environment on the tool at that point, base axes [N, Nm].
 
         Raises:
-            InputError: numbers of another count or not finite, or of another number of trials than at the first step.
+            InputError: a wrong size, values that are not finite, or another number of trials than at the first step.
         """
         observation = self._observation(state, wrench)
         if self._skill is None:
@@ -110,7 +109,6 @@ class Following:
         return self._actions(push, stiffness)
 
     def _observation(self, state: Float, wrench: Float) -> Observation:
-        """What the skill sees, at its centre of compliance."""
         for name, values, size in (("state", state, STATE), ("wrench", wrench, WRENCH)):
             if values.ndim != 2 or values.shape[1] != size or not np.all(np.isfinite(values)):
                 text = f"should be (N, {size}) finite numbers, and has shape {values.shape} or a number that is none"
@@ -131,7 +129,7 @@ class Following:
         return Observation(time, dt, pose, twist, move_wrench(wrench, self._arm))
 
     def _push(self, observation: Observation, command: Command) -> tuple[Float, Float]:
-        """Wrench (N, 6) that the skill wants and its stiffness (N, 6, 6), both at the observed point, base axes."""
+        """Wrench (N, 6) of the skill and its stiffness (N, 6, 6), at the observed point, base axes."""
         position, rotation = command.pose
         turned = rotation_vector(rotation @ np.swapaxes(observation.pose.rotation, -1, -2))
         error = np.concatenate([position - observation.pose.position, turned], axis=1)

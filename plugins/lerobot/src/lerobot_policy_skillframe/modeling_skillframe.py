@@ -1,6 +1,6 @@
-"""`SkillframePolicy`: a learned skill that LeRobot resets and asks for actions like any other policy.
+"""`SkillframePolicy`: a learned skill as a LeRobot policy.
 
-It has no weights. A saved policy is a folder with `config.json` and the skill file as it was.
+It has no weights. A saved policy is a folder with `config.json` and the skill file.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ class SkillframePolicy(PreTrainedPolicy):  # type: ignore[misc]
     Args:
         config: with the skill file's path, where no document is given.
         document: the skill file's content, checked.
-        given: statistics and metadata that LeRobot's factory hands to every policy; nothing is normalised.
+        given: statistics and metadata of LeRobot's factory, unused.
 
     Attributes:
         document: the skill.
-        following: the skill at the policy's rate; its `status` and `reason` tell how it stands.
+        following: the skill at the policy's rate, with `status` and `reason`.
 
     Raises:
         InputError, UnknownName: no skill file, or one that cannot be run.
@@ -60,7 +60,7 @@ class SkillframePolicy(PreTrainedPolicy):  # type: ignore[misc]
         self.following.reset()
 
     def select_action(self, batch: dict[str, Tensor], **given: Any) -> Tensor:
-        """The action (N, 6 or 12) for what is observed now, in the layout of skillframe's environments.
+        """Action (N, 6 or 12) for an observation, as of skillframe's environments.
 
         Args:
             batch: `observation.state` (N, 7) and `observation.wrench` (N, 6), or (7,) and (6,) of one trial.
@@ -74,9 +74,9 @@ class SkillframePolicy(PreTrainedPolicy):  # type: ignore[misc]
         return torch.as_tensor(actions, dtype=torch.float32, device=batch[OBSERVED_STATE].device)
 
     def predict_action_chunk(self, batch: dict[str, Tensor], **given: Any) -> Tensor:
-        """A chunk of one action (N, 1, 6 or 12), since the next one depends on what is felt then.
+        """A chunk of one action (N, 1, 6 or 12), since the next depends on the next wrench.
 
-        Like `select_action` it lets the skill's clock go on. Arguments and errors are the same.
+        It advances the skill's clock as `select_action` does.
         """
         return self.select_action(batch, **given)[:, None]
 
@@ -104,10 +104,10 @@ class SkillframePolicy(PreTrainedPolicy):  # type: ignore[misc]
     def from_pretrained(
         cls, pretrained_name_or_path: str | Path, *, config: SkillframeConfig | None = None, **given: Any
     ) -> SkillframePolicy:
-        """A policy that was saved.
+        """A saved policy.
 
         Args:
-            pretrained_name_or_path: its folder. Nothing is fetched from a hub.
+            pretrained_name_or_path: its folder; no hub is used.
             config: in place of the saved one.
             given: ignored.
 
@@ -124,7 +124,7 @@ class SkillframePolicy(PreTrainedPolicy):  # type: ignore[misc]
 
 
 def _array(batch: dict[str, Tensor], name: str, *others: str) -> Float:
-    """The first of some features of a batch, (N, n)."""
+    """The first available feature of a batch, (N, n)."""
     for each in (name, *others):
         if each in batch:
             values: Float = batch[each].detach().cpu().numpy().astype(float)

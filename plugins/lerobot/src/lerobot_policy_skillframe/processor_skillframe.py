@@ -1,4 +1,4 @@
-"""Processors around the policy: they batch and move, and do not scale, since all numbers have units."""
+"""Processors around the policy, which batch and move without scaling, since all numbers have units."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from lerobot_policy_skillframe.configuration_skillframe import SkillframeConfig
 
 
 def make_skillframe_pre_post_processors(config: SkillframeConfig, dataset_stats: Any = None) -> tuple[Any, Any]:
-    """What LeRobot's factory calls for the pipelines before and behind the policy.
+    """The pipelines before and behind the policy, for LeRobot's factory.
 
     Args:
         config: of the policy.

@@ -1,15 +1,14 @@
-"""skillframe plug-in: Linear Motion with Compliance (LMC), one phase of a compliant assembly skill in six dimensions.
+"""Plug-in for Linear Motion with Compliance (LMC), one phase of a compliant assembly skill in six dimensions.
 
-Read in this order: `intervals` (what is measured), `work`, `sectors` and `directions`, `axes`, `gains` (the four
-decisions), `learner` (their flow, Fig. 6 of the overview paper), `runtime` (the skill that runs). This module is all
-that is imported when plug-ins are listed.
+Reading order: `intervals`, `work`, `pieces`, `posterior`, `axes`, `gains`, `learner` (their flow), `runtime` (the
+skill). Listing plug-ins imports this module only.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from skillframe.extend.hookspecs import hookimpl
+from skillframe import hookimpl
 from skillframe.extend.records import Lazy, SkillType
 
 skillframe_contract = "0.2"
@@ -17,10 +16,10 @@ skillframe_contract = "0.2"
 
 @hookimpl
 def skillframe_skills() -> Iterable[SkillType]:
-    """The kind of skill that this plug-in provides."""
+    """The kind of skill of this plug-in."""
     yield SkillType(
         name="lmc",
-        summary="linear motion with compliance: push one way, give way in others, learned from forces",
+        summary="linear motion with compliance: push one way, compliant in others, learned from forces",
         build=Lazy("skillframe_lmc.runtime:build"),
         check=Lazy("skillframe_lmc.phase:read_phase"),
         learn=Lazy("skillframe_lmc.learner:learn"),

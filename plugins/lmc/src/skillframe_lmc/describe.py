@@ -1,4 +1,4 @@
-"""An LMC skill in words: "push along -z at 20 mm/s; free along x; turns freely about y", then the details."""
+"""Description of an LMC skill: a headline, then the details."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from skillframe_lmc.words import axis_words, direction_words, exact_words, liste
 
 
 def describe(document: Document) -> list[str]:
-    """The skill in words, the headline first."""
+    """The lines, the headline first."""
     phase = read_phase(document)
     return [headline(phase), *_details(phase), *_messages(phase), _stops(phase), _frame(read_frame(document))]
 
 
 def headline(phase: Phase) -> str:
-    """What the skill does, in one line."""
+    """The skill in one line."""
     move, turn = phase.translation, phase.rotation
     parts = []
     if move.desired_direction is not None:
@@ -37,12 +37,18 @@ def headline(phase: Phase) -> str:
     elif len(turn.compliant_axes):
         parts.append(f"turns freely about {_axes(turn)}")
     elif turn.desired_direction is None:
-        parts.append("holds its attitude")
+        parts.append("holds its orientation")
     return "; ".join(parts)
 
 
 def _axes(part: Part) -> str:
-    return listed([axis_words(axis) for axis in part.compliant_axes])
+    axes = part.compliant_axes
+    if len(axes) != 2:
+        return listed([axis_words(axis) for axis in axes])
+    across = axis_words(np.cross(*axes) / np.linalg.norm(np.cross(*axes)))
+    if across in ("x", "y", "z"):
+        return listed([name for name in "xyz" if name != across])
+    return f"every direction square to {across}"
 
 
 def _details(phase: Phase) -> list[str]:
@@ -69,17 +75,17 @@ def _direction(part: Part) -> str:
     if part.desired_direction is None:
         return "held" if part.evidence.get("held") else "no desired direction"
     text = f"desired direction {exact_words(part.desired_direction)}"
-    angle, known = part.evidence.get("pyramid_angle_rad"), known_rad(part)
-    if angle is None or known is None:
+    share, known = part.evidence.get("explained"), known_rad(part)
+    if share is None or known is None:
         return text
     return (
-        f"{text} (consistent if the hand was off by up to {degrees(angle):.0f} degrees; "
-        f"the direction is known to about {degrees(known):.0f} degrees)"
+        f"{text} (explains {100.0 * share:.0f} % of what was shown; the direction is known to about "
+        f"{degrees(known):.0f} degrees)"
     )
 
 
 def known_rad(part: Part) -> float | None:
-    """Half the opening of a cone with the solid angle of the directions that explain as much [rad], None if unknown."""
+    """Half-opening of a cone with the solid angle of the directions that explain as much [rad], or None."""
     area = part.evidence.get("feasible_solid_angle_sr")
     return None if area is None else acos(max(1.0 - area / (2.0 * pi), -1.0))
 
@@ -107,7 +113,7 @@ def _stops(phase: Phase) -> str:
 
 
 def _frame(frame: SkillFrame) -> str:
-    axes = "axes of the tool's attitude at the start of the phase" if frame.from_start else "base axes"
+    axes = "axes of the tool's orientation at the start of the phase" if frame.from_start else "base axes"
     named = (
         ("learned at", frame.learned_at), ("hand at", frame.work_at),
         ("centre of compliance", frame.center_of_compliance),

@@ -1,10 +1,9 @@
-"""Pictures of what was learned and why from the skill file alone: after Figs. 13 and 14 of the overview paper."""
+"""Pictures of a learned phase from the skill file alone, after Figs. 13 and 14 of the overview paper."""
 
 from __future__ import annotations
 
 import io
 from collections.abc import Callable
-from math import degrees
 from typing import TYPE_CHECKING, Any
 
 from skillframe.extend.records import Document, Illustration
@@ -38,7 +37,7 @@ def explain(document: Document) -> list[Illustration]:
     axes = "base" if document["frame"]["axes"] == "base" else "tool at start"
     found = []
     for name, part in moved.items():
-        if part.evidence.get("pyramid_angle_rad") is not None:
+        if part.evidence.get("feasible_solid_angle_sr") is not None:
             found.append(_directions(name, part, axes))
         if part.evidence.get("criterion"):
             found.append(_axes(name, part, axes))
@@ -52,24 +51,18 @@ def _held(part: Part) -> bool:
 
 
 def _directions(name: str, part: Part, axes: str) -> Illustration:
-    drawing = _svg(lambda: pictures.directions(name, part, axes))
-    angle = degrees(part.evidence["pyramid_angle_rad"])
-    opening = f"{angle:.0f} degrees" if angle < 90.0 else "more than 90 degrees"
+    drawing = _svg(lambda: pictures.directions(part, axes))
     what, load = ("push", "force") if name == "translation" else ("turning push", "torque")
     if part.desired_direction is None:
-        end = (
-            f"The hand would have been off by {opening} before one direction explained everything, so no desired "
-            "direction exists."
-        )
+        end = "No direction explains enough of them, so no desired direction exists."
     else:
         end = (
-            f"The black outline holds every {what} that explains all demonstrations "
-            f"({part.evidence['feasible_solid_angle_sr']:.2f} sr); the star is the one that was chosen, where it lies "
-            "deepest."
+            f"Inside the black outline a {what} explains most of what all demonstrations showed "
+            f"({part.evidence['feasible_solid_angle_sr']:.2f} sr); the star is the one that was chosen, in its middle."
         )
     caption = (
-        f"Each coloured patch is one interval of a demonstration: the {what}es that would have caused the motion that "
-        f"was seen, between the motion itself and the negative of the measured {load}, widened for a wavering hand. "
+        f"Each coloured patch is one piece of a demonstration: the {what}es that would have caused the motion that was "
+        f"seen, between the motion itself and the negative of the measured {load}, with some room for a wavering hand. "
         f"One colour per demonstration. {end}"
     )
     return Illustration(f"Which {what}es explain the {name}?", caption, drawing)
@@ -82,14 +75,11 @@ def _axes(name: str, part: Part, axes: str) -> Illustration:
     without = "" if part.desired_direction is None else ", less what the desired direction explains (green)"
     caption = (
         f"Left: the mean direction of motion of each demonstration (blue){without}, and the principal axes (red, those "
-        "that became compliant drawn strong). What remains was caused by the environment, so the tool gives way there. "
-        "Right: the criterion weighs what stays unexplained against the number of axes; the lowest bar wins"
+        "that became compliant drawn strong). What remains was caused by the environment, so the tool is compliant "
+        "there. Right: the criterion weighs what stays unexplained against the number of axes; the lowest bar wins"
     )
-    if part.evidence.get("axes_by_faces"):
-        caption += f", but faces were touched, and they decide: they turned the push aside along {axes_are}."
-    else:
-        caption += f": {axes_are}."
-    return Illustration(f"Along which axes must the {name} give way?", caption, drawing)
+    caption += f": {axes_are}."
+    return Illustration(f"Along which axes must the {name} comply?", caption, drawing)
 
 
 def _work(parts: dict[str, Part]) -> Illustration:
@@ -105,7 +95,6 @@ def _work(parts: dict[str, Part]) -> Illustration:
 
 
 def _svg(draw: Callable[[], Figure]) -> str:
-    """The figure as SVG text that is the same for the same document."""
     import matplotlib
     from matplotlib.backends.backend_svg import FigureCanvasSVG
 

@@ -1,15 +1,13 @@
-r"""From a recording to intervals of motion: blocks of 20 ms, then knots by path.
+r"""Cut a recording into intervals of motion: blocks of 20 ms, then knots by path.
 
-Pose and wrench are averaged over 20 ms (the quaternion's mean direction, which equals the mean rotation to second order
-over so short a time), which removes position noise before anything is cut. Translation and rotation are then cut apart,
-each by its own path: a new knot where the distance from the last knot reaches a step, so that standing still adds
-nothing. For an interval \(k\),
+Pose and wrench are means over 20 ms (the normalised mean quaternion is the mean rotation to second order), which
+removes position noise. Translation and rotation are cut by their own paths, with a knot where the distance from the
+last one reaches a step, so that rest adds nothing. For an interval \(k\),
 
     V_k = x_{k+1} - x_k   or   log(R_{k+1} R_k^T),    F_k = mean of the wrench while moving,    W_k = sum of F . dx
 
-(the overview paper speaks of intervals without saying how they are cut; by path is our choice). The step is 2 mm
-or 1 degree, 1 mm on paths under 20 mm, smaller where the whole motion is shorter than five of them, and larger where
-the position noise asks for it or the path is long.
+The overview paper does not state how intervals are cut. The step is 2 mm or 1.1 degrees, 1 mm on paths under 20 mm,
+smaller for motions shorter than five of them, and larger for position noise or long paths.
 """
 
 from __future__ import annotations
@@ -19,16 +17,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.demonstration.convention import measures_torque
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
-from skillframe.frames import Float, Pose, cross, matrix_from_quaternion, norm, rotate, rotation_vector
-from skillframe_lmc.settings import Settings
+from skillframe.frames import Float, Pose, continuous, cross, matrix_from_quaternion, norm, rotate, rotation_vector
+from skillframe_lmc.settings import LEVER_M, Settings
 
 BLOCK_S = 0.02
-MOST_INTERVALS = 80  # a longer path gets longer steps: a person's wandering is correlated over 15 mm anyway
-FEWEST_STEPS = 5.0  # a motion as short as it may be is still cut into this many
+MOST_INTERVALS = 80  # longer paths get longer steps
+FEWEST_STEPS = 5.0  # of the shortest motion
 NOISE_STEPS = 12.0  # step >= 12 sigma keeps the direction's noise under atan(sqrt(2) / 12) = 7 degrees
-MOVING_SHARE = 0.15  # of the typical speed; slower is standing still
+LENGTH_BLOCKS = 5  # 0.1 s between the points by which a length is taken
+MOVING_SHARE = 0.15  # of the typical speed; slower is rest
 
 
 class Track(NamedTuple):
@@ -40,7 +40,7 @@ class Track(NamedTuple):
         quaternion: (B, 4), in base.
         rotation: (B, 3, 3), in the axes of learning.
         force: (B, 3) environment on tool [N].
-        torque: (B, 3) the same, taken at the hand [Nm].
+        torque: (B, 3) the same, at the teacher's grip [Nm].
         samples: (B,) raw samples in each block.
         noise: standard deviations of a raw force [N] and torque [Nm] sample.
     """
@@ -56,16 +56,16 @@ class Track(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """One part (translation or rotation) of one demonstration, cut into K intervals.
+    """Translation or rotation of one demonstration, cut into K intervals.
 
     Attributes:
         displacement: (K, 3) V [m or rad].
         load: (K, 3) mean force or torque of the environment on the tool [N or Nm].
         work: (K,) done by that load [J].
-        load_min: below it an interval counts as free.
+        load_min: smaller loads count as free.
         excursion: largest distance from the start [m or rad].
         path: length through the knots [m or rad].
-        duration: time spent moving [s].
+        duration: time in motion [s].
     """
 
     displacement: Float
@@ -83,7 +83,7 @@ def track(demonstration: Demonstration, at: Float, hand: Float, axes: str) -> Tr
     Args:
         demonstration: as read.
         at: (3,) learning point in the tool frame.
-        hand: (3,) point where the hand holds, in the tool frame.
+        hand: (3,) the teacher's grip in the tool frame.
         axes: "base" or "phase_start".
 
     Raises:
@@ -91,10 +91,10 @@ def track(demonstration: Demonstration, at: Float, hand: Float, axes: str) -> Tr
     """
     where = demonstration.source or "demonstration"
     columns = np.column_stack(
-        [demonstration.time, demonstration.position, _continuous(demonstration.quaternion), demonstration.wrench]
+        [demonstration.time, demonstration.position, continuous(demonstration.quaternion), demonstration.wrench]
     )
     if not np.all(np.isfinite(columns)):
-        raise InputError(where, "holds values that are not finite", "run skillframe demonstration check on it")
+        raise InputError(where, "holds values that are not finite", "run skillframe check on it")
     means, counts = _block_means(columns)
     if len(means) < 3:
         raise InputError(where, f"is only {demonstration.duration:.3f} s long", "record more of the motion")
@@ -103,17 +103,26 @@ def track(demonstration: Demonstration, at: Float, hand: Float, axes: str) -> Tr
     tool = Pose(means[:, 1:4], rotation)
     force = means[:, 8:11]
     torque = means[:, 11:14] - cross(rotate(rotation, np.broadcast_to(hand, force.shape)), force)
+    if not measures_torque(demonstration.meta):
+        torque = np.zeros_like(force)
     home = rotation[0].T if axes == "phase_start" else np.eye(3)
     vectors = [tool.at(at).position, force, torque]
     position, force, torque = (np.ascontiguousarray(v @ home.T) for v in vectors)
     return Track(means[:, 0], position, quaternion, home @ rotation, force, torque, counts, _noise(demonstration))
 
 
-def _continuous(quaternion: Float) -> Float:
-    """Quaternions without sign flips from sample to sample."""
-    flips = (quaternion[1:] * quaternion[:-1]).sum(-1) < 0.0
-    result: Float = quaternion * np.concatenate([[1.0], np.where(np.cumsum(flips) % 2, -1.0, 1.0)])[:, None]
-    return result
+def at_point(blocks: Track, shift: Float, lever: Float) -> Track:
+    """A track at another point of the tool, with the torque there.
+
+    Args:
+        blocks: at the learning point.
+        shift: (3,) from the learning point to the other point, in the tool frame [m].
+        lever: (3,) from the other point to the teacher's hand, in the tool frame [m].
+    """
+    turned = (rotate(blocks.rotation, np.broadcast_to(each, blocks.force.shape)) for each in (shift, lever))
+    moved, arm = turned
+    torque = blocks.torque + cross(arm, blocks.force) if np.any(blocks.torque) else blocks.torque
+    return blocks._replace(position=blocks.position + moved, torque=torque)
 
 
 def _block_means(columns: Float) -> tuple[Float, Float]:
@@ -125,7 +134,7 @@ def _block_means(columns: Float) -> tuple[Float, Float]:
 
 
 def _noise(demonstration: Demonstration) -> tuple[float, float]:
-    """Noise of a wrench sample: from the metadata, else from second differences (their median ignores spikes)."""
+    """Noise of a wrench sample, from the metadata or else from second differences."""
     stated = demonstration.meta.get("sensor")
     stated = stated if isinstance(stated, dict) else {}
     names, parts = ("force_noise", "torque_noise"), (slice(0, 3), slice(3, 6))
@@ -139,7 +148,7 @@ def _noise(demonstration: Demonstration) -> tuple[float, float]:
 
 
 def _white_noise(values: Float) -> float:
-    """Standard deviation of white noise on a smooth signal (T, n). For noise, second differences have sqrt(6) sigma."""
+    """Standard deviation of white noise on a smooth signal (T, n), from second differences."""
     if len(values) < 5:
         return 0.0
     second = values[2:] - 2.0 * values[1:-1] + values[:-2]
@@ -147,51 +156,46 @@ def _white_noise(values: Float) -> float:
 
 
 def translation(blocks: Track, settings: Settings) -> Motion:
-    """The translational intervals of a demonstration."""
+    """Translational intervals of a demonstration."""
     x = blocks.position
     distance = norm(x - x[0])
-    step = _translation_step(x, float(distance.max()), settings)
-    knots = _knots(x, step)
+    step = settings.step_m * (1.0 if _length(x) >= 10.0 * settings.step_m else 0.5)
+    knots = cut(x, step)
     return _motion(blocks, knots, np.diff(x, axis=0), x[knots[1:]] - x[knots[:-1]], blocks.force, 0, distance, settings)
 
 
+def cut(points: Float, step: float) -> NDArray[np.intp]:
+    """Indices of the knots of a path (B, n), a step apart, or less on short paths and more on noisy or long ones."""
+    excursion = float(norm(points - points[0]).max())
+    step = min(step, excursion / FEWEST_STEPS)
+    noise = min(NOISE_STEPS * _white_noise(points), excursion / 8.0)
+    return _knots(points, max(step, _length(points) / MOST_INTERVALS, noise))
+
+
 def rotation(blocks: Track, settings: Settings) -> Motion:
-    """The rotational intervals of a demonstration, with increments in the axes of learning."""
+    """Rotational intervals of a demonstration, in the axes of learning."""
     R = blocks.rotation
     distance = norm(rotation_vector(R @ R[0].T))
     chord = 2.0 * blocks.quaternion  # |2 q_1 - 2 q_0| is the angle between them, to third order
-    coarse = _path(chord, settings.step_rad)
-    excursion = float(distance.max())
-    step = _widened(min(settings.step_rad, excursion / FEWEST_STEPS), coarse, _white_noise(chord), excursion)
-    knots = _knots(chord, step)
+    knots = cut(chord, settings.step_m / LEVER_M)
     fine = rotation_vector(R[1:] @ np.swapaxes(R[:-1], -1, -2))
     whole = rotation_vector(R[knots[1:]] @ np.swapaxes(R[knots[:-1]], -1, -2))
     return _motion(blocks, knots, fine, whole, blocks.torque, 1, distance, settings)
 
 
 def touching(motion: Motion) -> Motion:
-    """The same motion without its intervals that are free of contact. Path and duration stay those of the whole."""
+    """The motion without free intervals, its path and duration unchanged."""
     keep = norm(motion.load) >= motion.load_min
     return motion._replace(displacement=motion.displacement[keep], load=motion.load[keep], work=motion.work[keep])
 
 
-def _translation_step(x: Float, excursion: float, settings: Settings) -> float:
-    path = _path(x, 0.5 * settings.step_m)
-    short = min(0.5 * settings.step_m, excursion / FEWEST_STEPS)
-    step = settings.step_m if path >= 10.0 * settings.step_m else short
-    return _widened(step, path, _white_noise(x), excursion)
-
-
-def _widened(step: float, path: float, noise: float, excursion: float) -> float:
-    return max(step, path / MOST_INTERVALS, min(NOISE_STEPS * noise, excursion / 8.0))
-
-
-def _path(points: Float, step: float) -> float:
-    return float(norm(np.diff(points[_knots(points, step)], axis=0)).sum())
+def _length(points: Float) -> float:
+    """Length of a path (B, n), without what its blocks' noise adds."""
+    return float(norm(np.diff(points[::LENGTH_BLOCKS], axis=0)).sum())
 
 
 def _knots(points: Float, step: float) -> NDArray[np.intp]:
-    """Indices where the distance from the last knot reaches the step. Plain floats make the fastest loop here."""
+    """Indices where the distance from the last knot reaches the step, in plain floats for speed."""
     rows, limit = points.tolist(), step * step
     knots, last = [0], rows[0]
     for i, row in enumerate(rows[1:], start=1):
@@ -215,8 +219,8 @@ def _motion(
     work = _sum_between((between * fine).sum(-1, keepdims=True), knots)[:, 0]
     samples = max(float(np.median(_sum_between(blocks.samples[1:, None], knots))), 1.0) if len(knots) > 1 else 1.0
     path = float(norm(whole).sum())
-    least = (settings.force_min_n, settings.torque_min_nm)[part]
-    # 8 sigma of an interval's mean keeps its direction within 7 degrees; 5 % of the strong ones is what a bias may be
+    least = settings.force_min_n * (1.0, LEVER_M)[part]
+    # 8 sigma of an interval's mean keeps its direction within 7 degrees; 5 % of the strong ones allows for a bias
     strong = float(np.percentile(norm(mean), 90)) if len(mean) else 0.0
     load_min = max(least, 8.0 * blocks.noise[part] / np.sqrt(samples), 0.05 * strong)
     used = slice(knots[0], knots[-1])
@@ -225,17 +229,24 @@ def _motion(
 
 
 def moving_blocks(fine: Float, elapsed: Float) -> Float:
-    """1 where the tool moves, 0 where it stands still: its speed over 0.1 s against that of half of the path."""
-    place = np.concatenate([np.zeros((1, 3)), np.cumsum(fine, axis=0)])
+    """1 where the tool moves, 0 at rest, by its speed over 0.1 s."""
+    place = np.concatenate([np.zeros((1, fine.shape[1])), np.cumsum(fine, axis=0)])
     clock = np.concatenate([[0.0], np.cumsum(elapsed)])
     i = np.arange(len(fine))
     before, after = np.maximum(i - 2, 0), np.minimum(i + 3, len(fine))
     speed = norm(place[after] - place[before]) / (clock[after] - clock[before])
-    order = np.argsort(speed)
-    travelled = np.cumsum((speed * elapsed)[order])
-    typical = speed[order][np.searchsorted(travelled, 0.5 * travelled[-1])] if len(order) else 0.0
-    result: Float = (speed > MOVING_SHARE * typical).astype(float)
+    result: Float = (speed > MOVING_SHARE * typical_speed(speed * elapsed, elapsed)).astype(float)
     return result
+
+
+def typical_speed(length: Float, elapsed: Float) -> float:
+    """Speed below which half of a path was travelled, by lengths (K,) of its parts and the times they took, or 0."""
+    order = np.argsort(length / elapsed)
+    travelled = np.cumsum(length[order])
+    if not len(order):
+        return 0.0
+    half = order[np.searchsorted(travelled, 0.5 * travelled[-1])]
+    return float(length[half] / elapsed[half])
 
 
 def _sum_between(values: Float, knots: NDArray[np.intp]) -> Float:

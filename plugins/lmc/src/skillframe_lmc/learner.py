@@ -2,106 +2,56 @@ r"""The flow of learning (Fig. 6 of the overview paper).
 
 First the pitch, then for translation and rotation alike
 
-    moved at all?      no: held stiff
-    who moved it?      W = F_m . dx, or T_m . dbeta at the hand                     (3)        [work]
+    moved at all?      no: stiff
+    who moved it?      W = F_m . dx, or T_m . dbeta at the grip                     (3)        [work]
                        the environment, if W > 0 prevails: three compliant degrees of freedom
-    where to push?     intersection of the pyramids; may not exist      [sectors, directions, heading, modes, votes]
-                       its middle, where faces of one side were passed  [expected]
-                       where none exists, the way that was told (`LearnOptions.toward`)
-                       no turn is pushed, where it is known that the part goes straight (`LearnOptions.straight`)
-    where to give?     where faces turned the push aside; where none did, or the tool turned,
-                       principal axes of the motion that the push does not explain              [faces, axes]
-    how stiff?         zero along compliant axes, k elsewhere                                   [gains]
+    where to push?     the middle of what the pieces of all demonstrations believe; may not exist [pieces, posterior]
+                       with `concatenated`, the intersection of pyramids               [sectors, directions]
+                       without one, the given way (`LearnOptions.toward`)
+                       no turn, if the part is known to go straight (`LearnOptions.straight`)
+    where compliant?   principal axes of the motion that the push does not explain              [axes]
+    how stiff?         zero along compliant axes, k elsewhere, soft across a push                 [gains]
 
-and if both directions exist, their speeds are coupled by the pitch, lambda = nu / p. The wrench and the position are
-those of the learning point; the torque's work and sectors are taken at the hand, because only there is the teacher's
-torque apart from the lever arm of his force.
+If both directions exist, the pitch couples their speeds, lambda = nu / p. The torque's work and sectors are taken at
+the grip, where the teacher's torque is free of the lever arm of the force. The push is learned where the tool touches:
+at the point named tip, unless another was given. Axes belong to the learning point, which the skill steers.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict
 from math import radians
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from skillframe.config import build
+from skillframe.demonstration.convention import measures_torque
 from skillframe.demonstration.record import Demonstration
 from skillframe.document.frame import frame_of
 from skillframe.errors import InputError
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, norm, unit
 from skillframe_lmc import evidence, intervals
-from skillframe_lmc.axes import CompliantAxes, compliant_axes, straightness
-from skillframe_lmc.directions import Choice, choose
-from skillframe_lmc.faces import face_axes
-from skillframe_lmc.gains import gains
-from skillframe_lmc.heading import heading
+from skillframe_lmc.axes import TURNED, compliant_axes, straightness
+from skillframe_lmc.directions import choose
+from skillframe_lmc.evidence import Learned, Name
+from skillframe_lmc.gains import ROTATION, TRANSLATION, Nominal, gains
 from skillframe_lmc.intervals import Motion, Track
-from skillframe_lmc.modes import mean_pushes
 from skillframe_lmc.phase import Stop
+from skillframe_lmc.pieces import Pieces, pushed, some, turned, until_left, whole_witness
+from skillframe_lmc.posterior import PUSH_EXISTS, TURN_EXISTS, Choice, decide, witnesses
 from skillframe_lmc.press import Press, presses
-from skillframe_lmc.sectors import Sectors, sectors
-from skillframe_lmc.settings import Settings
-from skillframe_lmc.votes import Votes, touched, voted
+from skillframe_lmc.sectors import concatenated, sectors
+from skillframe_lmc.settings import LEVER_M, Settings
 from skillframe_lmc.work import Work, work
 
-Name = Literal["translation", "rotation"]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Learned:
-    """What was decided about one part, and from what.
-
-    Attributes:
-        name: "translation" or "rotation".
-        motions: all demonstrations.
-        moving: those that moved this part.
-        given: sectors of those that voted.
-        work: who moved it; None if held.
-        choice: the votes; None if none were cast.
-        axes: compliant axes; None if held or fully compliant.
-        means: (n, 3) mean directions, a row for each that moved.
-        speed: mean demonstrated speed, without the pauses [m/s or rad/s].
-        pressed: the standing force of each demonstration, where it decided; empty where the motion did.
-        told: (3,) direction that was given from outside and taken, because the demonstrations show none.
-        aligned: the demonstrations show a push, which was only to align the part, because it is known to go straight.
-    """
-
-    name: Name
-    motions: Sequence[Motion]
-    moving: Sequence[Motion]
-    given: Sequence[Sectors]
-    work: Work | None
-    choice: Choice | None
-    axes: CompliantAxes | None
-    means: Float
-    speed: float
-    pressed: Sequence[Press] = ()
-    told: Float | None = None
-    aligned: bool = False
-
-    @property
-    def held(self) -> bool:
-        """The part did not move."""
-        return not self.moving
-
-    @property
-    def fully_compliant(self) -> bool:
-        """The environment moved it, and nobody told where to push."""
-        return self.told is None and self.work is not None and self.work.environment_drove
-
-    @property
-    def direction(self) -> Float | None:
-        """The desired direction, if it exists."""
-        shown = None if self.choice is None or self.aligned else self.choice.direction
-        return self.told if shown is None else shown
+FEWEST_PIECES = 3  # of a demonstration; fewer have no meaningful direction
 
 
 def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
-    """The body of a skill document (`frame`, `phases`, `settings`) from demonstrations of one phase.
+    """Body of a skill document (`frame`, `phases`, `settings`) from demonstrations of one phase.
 
     Raises:
         InputError: no demonstration, tools that differ, values that are not finite, or an unknown setting.
@@ -110,10 +60,12 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     settings = build(Settings, options.settings, "--set")
     frame = frame_of(demonstrations, options)
     at, hand = np.array(frame["learned_at"]), np.array(frame["work_at"])
+    touch = at if options.at is not None else np.array(frame["frames"].get("tip", at))
     tracks = [intervals.track(d, at, hand, options.axes) for d in demonstrations]
-    rotation = _learn_part("rotation", tracks, intervals.rotation, settings, straight=options.straight)
+    rotation = _rotation(tracks, settings, options.straight, all(measures_torque(d.meta) for d in demonstrations))
+    touching = [intervals.at_point(track, touch - at, hand - touch) for track in tracks]
     toward = None if options.toward is None else unit(np.array(options.toward))
-    translation = _learn_part("translation", tracks, intervals.translation, settings, not rotation.held, toward)
+    translation = _translation(tracks, touching, settings, rotation, toward)
     return {
         "frame": frame,
         "phases": [_phase(translation, rotation, settings)],
@@ -121,40 +73,102 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     }
 
 
-def _learn_part(
-    name: Name, tracks: Sequence[Track], cut: Callable[[Track, Settings], Motion], settings: Settings,
-    turned: bool = True, toward: Float | None = None, straight: bool = False,
-) -> Learned:  # fmt: skip
-    motions = [cut(blocks, settings) for blocks in tracks]
-    if settings.contact_only:
-        motions = [intervals.touching(motion) for motion in motions]
-    least = settings.moving_m if name == "translation" else settings.moving_rad
-    moving = [m for m in motions if m.excursion >= least and len(m.displacement)]
-    done = work(moving) if moving else None
-    votes = Votes(None, [sectors(m) for m in moving])
+def _rotation(tracks: Sequence[Track], settings: Settings, straight: bool, measured: bool) -> Learned:
+    motions = _cut([intervals.rotation(track, settings) for track in tracks], settings)
+    which = _moving(motions, settings.moving_rad)
+    moving = [motions[i] for i in which]
+    shown = turned([tracks[i] for i in which], moving, settings) if moving else None
+    done, choice, axes = work(moving) if moving else None, None, None
     if done is not None and not done.environment_drove:
-        votes = voted(name, moving, settings, turned)
-    stood = _standing(name, tracks, motions, moving, votes.choice, settings)
-    if stood is not None:
-        done, votes = stood.work, Votes(stood.choice, [p.sectors for p in stood.presses])
-    elif votes.choice is not None and votes.choice.direction is None and not turned:
-        moving, votes = touched(name, moving, votes, settings)
-    choice, means, axes = votes.choice, _means(moving), None
+        choice = _choice("rotation", moving, shown, settings)
     aligned = straight and choice is not None and choice.direction is not None
-    direction = None if choice is None or aligned else choice.direction
-    told = toward if done is not None and direction is None else None
-    if done is not None and (told is not None or not done.environment_drove):
-        direction = direction if told is None else told
-        rows = np.concatenate([means, mean_pushes(votes.modes)]) if stood is None else stood.means(least)
-        axes = compliant_axes(rows, direction, _straightness(name, moving, means, choice, settings))
-        if settings.faces and direction is not None and stood is None and not turned:
-            axes = axes.unless(face_axes(moving, direction))
-    path, time = sum(m.path for m in moving), sum(m.duration for m in moving)
+    if done is not None and not done.environment_drove:
+        direction = None if choice is None or aligned else choice.direction
+        axes = compliant_axes(_means(moving), direction, TURNED)
     return Learned(
-        name=name, motions=motions, moving=moving, given=votes.given, work=done, choice=choice, axes=axes, means=means,
-        speed=path / time if time > 0.0 else 0.0, pressed=() if stood is None else stood.presses, told=told,
-        aligned=aligned,
+        name="rotation", motions=motions, moving=moving, pieces=shown, work=done, choice=choice, axes=axes,
+        means=_means(moving), speed=_speed(moving), aligned=aligned, measured=measured,
+        one_motion=_one_motion("rotation", moving, shown, choice, settings),
     )  # fmt: skip
+
+
+def _translation(
+    tracks: Sequence[Track], touching: Sequence[Track], settings: Settings, rotation: Learned, toward: Float | None
+) -> Learned:
+    motions = _cut([intervals.translation(track, settings) for track in tracks], settings)
+    which = _moving(motions, settings.moving_m)
+    moving, means = [motions[i] for i in which], _means([motions[i] for i in which])
+    shown, done, choice, axes = None, None, None, None
+    if moving:
+        turned_too = rotation.direction is not None
+        shown, done = pushed([touching[i] for i in which], moving, settings, turned_too=turned_too), work(moving)
+        choice = None if done.environment_drove else _choice("translation", moving, shown, settings)
+    stood = _standing(tracks, motions, moving, choice)
+    if stood is not None:
+        done, choice = stood.work, stood.choice
+    direction = None if choice is None else choice.direction
+    told = toward if done is not None and direction is None else None
+    direction = direction if told is None else told
+    if done is not None and (told is not None or not done.environment_drove):
+        sigma = straightness(float(np.mean([m.path for m in moving])), means)
+        axes = compliant_axes(means if stood is None else stood.means(settings.moving_m), direction, sigma)
+        if rotation.axes is not None and direction is not None and len(axes.axes) == len(rotation.axes.axes) == 1:
+            axes = axes.square_to(rotation.axes.axes[0], direction)
+    return Learned(
+        name="translation", motions=motions, moving=moving, pieces=shown, work=done, choice=choice, axes=axes,
+        means=means, speed=_speed(moving), pressed=() if stood is None else stood.presses, told=told,
+        one_motion=_one_motion("translation", moving, shown, choice, settings),
+    )  # fmt: skip
+
+
+def _cut(motions: list[Motion], settings: Settings) -> list[Motion]:
+    return [intervals.touching(motion) for motion in motions] if settings.contact_only else motions
+
+
+def _moving(motions: Sequence[Motion], least: float) -> list[int]:
+    return [i for i, m in enumerate(motions) if m.excursion >= least and len(m.displacement)]
+
+
+def _choice(name: Name, moving: Sequence[Motion], shown: Pieces | None, settings: Settings) -> Choice | None:
+    """Push of demonstrations that the teacher drove, or None where one has too few pieces.
+
+    How a tool leaves is no part of the task: where no push explains everything, the pieces until the last contact
+    decide, then contact alone, as a tool springs back that is let go.
+    """
+    if settings.concatenated:
+        given = [sectors(m, teacher_driven_only=name == "rotation") for m in moving]
+        enough = all(len(g.contact) >= min(FEWEST_PIECES, len(m.work)) for g, m in zip(given, moving, strict=True))
+        return choose([concatenated(given)]) if enough else None
+    if shown is None:
+        return None
+    if name == "rotation":
+        return _decided(name, shown, len(moving), TURN_EXISTS, settings)
+    found = _decided(name, shown, len(moving), PUSH_EXISTS, settings)
+    for part in (until_left(shown), some(shown, shown.contact)):
+        if found is not None and found.direction is None:
+            again = _decided(name, part, len(moving), PUSH_EXISTS, settings)
+            found = again if again is not None and again.direction is not None else found
+    return found
+
+
+def _decided(name: Name, shown: Pieces, count: int, exists: float, settings: Settings) -> Choice | None:
+    if np.bincount(shown.demonstration, minlength=count).min() < FEWEST_PIECES:
+        return None
+    return decide(witnesses(shown, whole_witness(name, settings)), exists)
+
+
+def _one_motion(
+    name: Name, moving: Sequence[Motion], shown: Pieces | None, choice: Choice | None, settings: Settings
+) -> bool:
+    """Whether all demonstrations have a push, or else one of them alone has."""
+    if choice is None or choice.direction is not None or shown is None:
+        return True
+    numbered = shown._replace(demonstration=np.zeros_like(shown.demonstration))
+    for i, motion in enumerate(moving):
+        alone = _choice(name, [motion], some(numbered, shown.demonstration == i), settings)
+        if alone is not None and alone.direction is not None:
+            return True
+    return False
 
 
 def _means(motions: Sequence[Motion]) -> Float:
@@ -162,57 +176,52 @@ def _means(motions: Sequence[Motion]) -> Float:
     return np.array([unit(m.displacement).mean(axis=0) for m in motions]).reshape(-1, 3)
 
 
+def _speed(motions: Sequence[Motion]) -> float:
+    time = sum(m.duration for m in motions)
+    return sum(m.path for m in motions) / time if time > 0.0 else 0.0
+
+
 class _Standing(NamedTuple):
-    """What was decided by standing force: see `press`."""
+    """Decision by standing force: see `press`."""
 
     presses: list[Press]
     work: Work
     choice: Choice
 
     def means(self, least: float) -> Float:
-        """Mean directions (n, 3) of the motions in contact that are long enough to be motions [m]."""
+        """Mean directions (n, 3) of motions in contact of at least `least` [m]."""
         touched = [p.motion.displacement for p in self.presses]
         return np.array([unit(d).mean(axis=0) for d in touched if norm(d).sum() >= least]).reshape(-1, 3)
 
 
 def _standing(
-    name: Name, tracks: Sequence[Track], motions: Sequence[Motion], moving: Sequence[Motion], moved: Choice | None,
-    settings: Settings,
-) -> _Standing | None:  # fmt: skip
-    """What the standing force says, or None unless all were pressed.
+    tracks: Sequence[Track], motions: Sequence[Motion], moving: Sequence[Motion], moved: Choice | None
+) -> _Standing | None:
+    """Result of the standing force, or None unless all were pressed.
 
-    It is asked where the motion alone gives no direction (`moved`), or where nothing was met on the way.
+    It is used where the motion gives no direction (`moved`), or met nothing on the way.
 
     Raises:
-        InputError: they were pressed along their way, and no push explains it: what is left is a skill that gives way
-            along the one motion there was.
+        InputError: no push explains demonstrations that were pressed along their way; the skill would be compliant
+            along its only motion.
     """
-    if name == "rotation" or len(moving) != len(motions) or (found := presses(tracks, motions)) is None:
+    if len(moving) != len(motions) or (found := presses(tracks, motions)) is None:
         return None
     in_air = all(p.in_air for p in found)
     done = work([p.motion for p in found])
     if done.environment_drove or not (in_air or moved is None or moved.direction is None):
         return None
-    choice = choose([p.sectors for p in found], settings, heading(moving))
+    choice = choose([p.sectors for p in found])
     if choice.direction is None:
-        force = np.median([p.force for p in found])
+        force, off = np.median([p.force for p in found]), np.degrees(choice.pyramid_angle or 0.0)
         raise InputError(
             "learn", f"the tool was pressed with {force:.0f} N where it stood, along the way it had come, and no one "
-            f"push explains it (the hand would have been off by {np.degrees(choice.pyramid_angle):.0f} degrees)",
+            f"push explains it (the hand would have been off by {off:.0f} degrees)",
             "cut the recordings into phases (skillframe segment), or demonstrate the press the same way each time",
         )  # fmt: skip
     if in_air:
         choice = choice._replace(direction=unit(np.mean([p.push for p in found], axis=0)))
     return _Standing(found, done, choice)
-
-
-def _straightness(
-    name: Name, moving: Sequence[Motion], means: Float, choice: Choice | None, settings: Settings
-) -> float:
-    if name == "rotation":
-        return settings.straightness_rad
-    agreed = None if choice is None or choice.direction is None else choice.pyramid_angle
-    return straightness(float(np.mean([m.path for m in moving])), settings.straightness_m, agreed, means)
 
 
 def _phase(translation: Learned, rotation: Learned, settings: Settings) -> Document:
@@ -226,19 +235,16 @@ def _phase(translation: Learned, rotation: Learned, settings: Settings) -> Docum
         settings.stiffness_n_m * leads[0] / settings.lead_force_n,
         settings.stiffness_nm_rad * leads[1] / settings.lead_torque_nm,
     ]
-    floors = [
-        (settings.mass_kg, settings.damping_min_ns_m),
-        (settings.inertia_kg_m2, settings.damping_min_nms_rad),
-    ]
+    soft = translation.direction if rotation.held and not translation.pressed else None
     parts: Document = {
-        part.name: _part(part, speed, k, *floor, settings)
-        for part, speed, k, floor in zip((translation, rotation), speeds, stiffness, floors, strict=True)
+        "translation": _part(translation, speeds[0], stiffness[0], TRANSLATION, settings, soft),
+        "rotation": _part(rotation, speeds[1], stiffness[1], ROTATION, settings),
     }
     return {**parts, "pitch": pitch, "stop": asdict(_stop(translation, rotation, speeds, leads, settings))}
 
 
 def _speeds(translation: Learned, rotation: Learned, pitch: float | None, settings: Settings) -> tuple[float, float]:
-    """Both speeds, nu and lambda: demonstrated, capped, and coupled by the pitch if both directions exist."""
+    """Speeds nu and lambda: demonstrated, capped, and coupled by the pitch."""
     nu = 0.0 if translation.direction is None else min(translation.speed, settings.speed_max_m_s)
     turn = 0.0 if rotation.direction is None else min(rotation.speed, settings.speed_max_rad_s)
     if nu > 0.0 and turn > 0.0 and pitch is not None:
@@ -248,7 +254,7 @@ def _speeds(translation: Learned, rotation: Learned, pitch: float | None, settin
 
 
 def _lead(part: Learned, least: float) -> float:
-    """Largest push: what the teacher needed (90th percentile in contact), if that is more than the default."""
+    """Largest push: the teacher's 90th percentile in contact, at least the default."""
     if part.pressed:
         least = max(least, float(np.median([p.force for p in part.pressed])))
     loads = np.concatenate([norm(m.load)[norm(m.load) >= m.load_min] for m in part.motions])
@@ -258,7 +264,7 @@ def _lead(part: Learned, least: float) -> float:
 def _stop(
     translation: Learned, rotation: Learned, speeds: tuple[float, float], leads: Sequence[float], settings: Settings
 ) -> Stop:
-    """Limits from the demonstrations' size: three times the travel, five times the time."""
+    """Limits: three times the demonstrated travel, five times the time."""
     travel = max(m.excursion for m in translation.motions)
     turn = max(m.excursion for m in rotation.motions)
     takes = [
@@ -269,7 +275,7 @@ def _stop(
     shown = max((m.duration for part in (translation, rotation) for m in part.motions), default=0.0)
     return Stop(
         stall_m=settings.stall_m,
-        stall_rad=settings.stall_rad,
+        stall_rad=settings.stall_m / LEVER_M,
         lead_force_n=leads[0],
         lead_torque_nm=leads[1],
         force_limit_n=max(60.0, 4.0 * leads[0]),
@@ -279,13 +285,15 @@ def _stop(
     )
 
 
-def _part(part: Learned, speed: float, k: float, inertia: float, floor: float, settings: Settings) -> Document:
-    axes = np.zeros((0, 3)) if part.axes is None else part.axes.axes
-    stiffness, damping = gains(axes, part.fully_compliant, k, inertia, floor)
+def _part(
+    part: Learned, speed: float, k: float, tool: Nominal, settings: Settings, soft: Float | None = None
+) -> Document:
+    free = np.eye(3) if part.fully_compliant else np.zeros((0, 3)) if part.axes is None else part.axes.axes
+    stiffness, damping = gains(free, k, tool, None if part.fully_compliant else soft, settings.side_stiffness)
     return {
         "desired_direction": None if part.direction is None else part.direction.tolist(),
         "speed": speed,
-        "compliant_axes": axes.tolist(),
+        "compliant_axes": [] if part.fully_compliant else free.tolist(),
         "fully_compliant": part.fully_compliant,
         "stiffness": stiffness.tolist(),
         "damping": damping.tolist(),

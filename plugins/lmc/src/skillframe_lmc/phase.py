@@ -1,4 +1,4 @@
-"""The one phase of an LMC skill document as checked records. What is wrong is named by its key."""
+"""The phase of an LMC skill document as checked records."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from skillframe.config import build, coerce
 from skillframe.errors import InputError
 from skillframe.extend.records import Document
 from skillframe.frames import Float, norm
-from skillframe_lmc.kept import check_evidence
+from skillframe_lmc.evidence_check import check_evidence
 
 Vector = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stop:
-    """When the phase ends. This is ours, because the papers give no stop condition.
+    """Conditions for the end of the phase, which the papers lack.
 
     Attributes:
         stall_s: the phase is done when, while pushing, nothing has moved for this long,
         stall_m: no coordinate of the centre of compliance by this much,
-        stall_rad: and no element of the attitude's matrix by this much.
-        lead_force_n, lead_torque_nm: largest push: the desired pose never leads by more than this over the stiffness.
+        stall_rad: and no element of the orientation matrix by this much.
+        lead_force_n, lead_torque_nm: largest push; the desired pose leads by at most this over the stiffness.
         force_limit_n: a contact force above it fails the trial.
         time_limit_s: longer than this fails the trial; without a desired direction, the phase is then done.
         travel_limit_m, turn_limit_rad: farther from the start than this fails the trial.
@@ -50,9 +50,9 @@ class Part:
         desired_direction: (3,) unit vector, or None.
         speed: [m/s or rad/s].
         compliant_axes: (d, 3) unit vectors.
-        fully_compliant: all three degrees of freedom are free.
+        fully_compliant: all three degrees of freedom are compliant.
         stiffness, damping: (3, 3).
-        evidence: what it was decided from.
+        evidence: data of the decisions.
     """
 
     desired_direction: Float | None
@@ -66,7 +66,7 @@ class Part:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Phase:
-    """A phase: two parts, the pitch that couples them [m/rad], and when it ends."""
+    """Two parts, the pitch that couples them [m/rad], and the end."""
 
     translation: Part
     rotation: Part
@@ -78,7 +78,7 @@ def read_phase(document: Document) -> Phase:
     """The phase of a skill document.
 
     Raises:
-        InputError: not exactly one phase, or a key that is missing or holds the wrong thing.
+        InputError: not exactly one phase, or a key that is missing or has a wrong value.
     """
     phases = document.get("phases", [])
     if len(phases) != 1:
@@ -98,7 +98,7 @@ def read_phase(document: Document) -> Phase:
 
 
 def speed(document: Document) -> float | None:
-    """Speed of the push [m/s]. None for a skill that only turns or holds."""
+    """Speed of the push [m/s], None for a skill that only turns or holds."""
     push = read_phase(document).translation
     return None if push.desired_direction is None or push.speed == 0.0 else push.speed
 
@@ -135,7 +135,7 @@ def _unit(vector: Float, where: str) -> Float:
 
 def _gain(values: dict[str, Any], key: str, where: str) -> Float:
     matrix = np.array(_get(values, key, tuple[Vector, Vector, Vector], where))
-    scale = max(float(np.abs(matrix).max()), 1.0)  # 1 N/m: what rounding leaves of no stiffness is none
+    scale = max(float(np.abs(matrix).max()), 1.0)  # 1 N/m: rounding may leave so little of no stiffness
     if np.abs(matrix - matrix.T).max() > 1e-9 * scale or np.linalg.eigvalsh(matrix).min() < -1e-9 * scale:
         raise InputError(f"{where}.{key}", "should be symmetric and positive semi-definite", "learn the skill again")
     return matrix

@@ -1,4 +1,4 @@
-"""The drawings themselves, as matplotlib figures made without pyplot (nothing global is touched)."""
+"""Drawings as matplotlib figures, without pyplot's global state."""
 
 from __future__ import annotations
 
@@ -12,83 +12,98 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 from skillframe.frames import Float, norm, unit
+from skillframe_lmc.directions import SLACK, needs
 from skillframe_lmc.phase import Part
-from skillframe_lmc.projection import Plane, need_map, outline
+from skillframe_lmc.pieces import Pieces, pooled
+from skillframe_lmc.posterior import depth, log_probability, witnesses
+from skillframe_lmc.projection import Plane, outline
 from skillframe_lmc.sectors import Sectors
 
 COLOURS = ("#d1495b", "#2e6fba", "#3a9d6e", "#c98a1b", "#7a52a8", "#4f8f9d")
-TORN = 90.0  # degrees between neighbours: an outline that runs round the far side of the sphere cannot be filled
+TORN = 90.0  # degrees between neighbours: an outline on the sphere's far side cannot be filled
+CELLS, DRAWN = 121, radians(4.0)  # points of the outline's grid a side; half opening of a drawn sector
 INK, GREEN, BLUE, RED, GREY = "#1d2025", "#3a9d6e", "#2e6fba", "#d1495b", "#b9bec6"
 
 
-def directions(name: str, part: Part, axes: str) -> Figure:
-    """Pyramids of every demonstration in a plane around the desired direction, and their intersection (Fig. 13)."""
-    given = _sectors(part, teacher_driven_only=name == "rotation")
+def directions(part: Part, axes: str) -> Figure:
+    """Sectors of every demonstration around the desired direction, and the pushes that explain them (Fig. 13)."""
+    figure = Figure(figsize=(6.4, 5.4), layout="constrained")
+    draw_directions(figure.add_subplot(), part, axes)
+    return figure
+
+
+def draw_directions(canvas: Axes, part: Part, axes: str) -> None:
+    """The same on a canvas."""
+    given = _shown(part)
     plane = Plane(_centre(part, given))
     alpha = part.evidence["pyramid_angle_rad"]
-    drawn = min(alpha, radians(20.0))
-    figure = Figure(figsize=(6.4, 5.4), layout="constrained")
-    canvas = figure.add_subplot()
+    drawn = DRAWN if alpha is None else min(alpha, radians(20.0))
     reach = [30.0]
-    for colour, sectors in zip(_cycle(len(given)), given, strict=True):
-        for v, m, contact in zip(sectors.motion, sectors.push, sectors.contact, strict=True):
+    for colour, pieces in zip(_cycle(len(given)), given, strict=True):
+        for v, m, contact in zip(pieces.motion, pieces.edge, pieces.contact, strict=True):
             points = plane.to_plane(outline(v, m, bool(contact), drawn))
             if np.abs(np.diff(points, axis=0)).max() > TORN:
                 continue
             reach.append(float(np.abs(points).max()))
-            opacity = min(0.5, 2.0 / len(sectors.motion))
+            opacity = min(0.5, 2.0 / len(pieces.motion))
             canvas.add_patch(Polygon(points, facecolor=colour, edgecolor=colour, alpha=opacity, lw=0.6))
         canvas.plot([], [], color=colour, lw=6, alpha=0.6)
     extent = min(1.06 * float(np.percentile(reach, 90)), 180.0)
-    _intersection(canvas, plane, given, part, extent)
+    if part.desired_direction is not None:
+        _explaining(canvas, plane, given, part, extent)
     _frame_marks(canvas, plane, extent)
     canvas.set(xlim=(-extent, extent), ylim=(-extent, extent), aspect="equal")
     canvas.set_xlabel(f"towards +{plane.labels[0]} ({axes})  [degrees]")
     canvas.set_ylabel(f"towards +{plane.labels[1]} ({axes})  [degrees]")
     _legend(canvas, len(given), part)
-    return figure
 
 
-def _sectors(part: Part, *, teacher_driven_only: bool) -> list[Sectors]:
-    """The sectors kept in the evidence. Those that did not vote are left out."""
-    found = []
+def _shown(part: Part) -> list[Pieces]:
+    """The pieces that the file holds of each demonstration with any."""
+    found = list[Pieces]()
     for seen in part.evidence["demonstrations"]:
-        v, m = (np.array(seen[key], dtype=float).reshape(-1, 3) for key in ("motion", "push"))
-        contact = np.array(seen["contact"], dtype=bool)
-        keep = (v * m).sum(-1) >= 0.0 if teacher_driven_only else np.ones(len(v), dtype=bool)
-        if keep.any():
-            found.append(Sectors(unit(v[keep]), unit(m[keep]), contact[keep]))
+        count = len(seen["contact"])
+        if not count:
+            continue
+        v, m, edge = (unit(np.array(seen[key], dtype=float).reshape(-1, 3)) for key in ("motion", "push", "edge"))
+        contact, length = np.array(seen["contact"], dtype=bool), np.array(seen["length"])
+        found.append(Pieces(v, m, edge, contact, length, np.array(seen["turning"]), np.full(count, len(found))))
     return found
 
 
-def _centre(part: Part, given: list[Sectors]) -> Float:
+def _centre(part: Part, given: list[Pieces]) -> Float:
     if part.desired_direction is not None:
         return part.desired_direction
-    middles = np.array([unit(unit(s.motion + s.push).mean(axis=0)) for s in given])
+    middles = np.array([unit(unit(s.motion + s.edge).mean(axis=0)) for s in given])
     if norm(middles.mean(axis=0)) > 0.4:
         return unit(middles.mean(axis=0))
-    along = np.linalg.svd(middles)[2][0]  # they oppose each other: look square to the line between them
+    along = np.linalg.svd(middles)[2][0]  # opposed: look perpendicular to the line between them
     k = int(np.argmin(np.abs(along)))
     return unit(along[k] * along - np.eye(3)[k])
+
+
+def _explaining(canvas: Axes, plane: Plane, given: list[Pieces], part: Part, extent: float) -> None:
+    """Outline of the plateau of the posterior, or of what the papers' pyramids share, and the push."""
+    alpha = part.evidence["pyramid_angle_rad"]
+    side = np.linspace(-extent, extent, CELLS)
+    points = plane.to_sphere(np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2))
+    if alpha is None:
+        seen = witnesses(pooled(given), part.evidence["whole"])
+        logs = log_probability(points, seen)
+        values, level = -logs, -(logs.max() - depth(float(logs.max()), seen))
+    else:
+        values = needs(points, [Sectors(p.motion, p.push, p.contact) for p in given])[0]
+        level = SLACK * alpha
+    if values.min() < level:
+        canvas.contour(side, side, values.reshape(CELLS, CELLS), levels=[level], colors=INK, linewidths=2.0)
+    canvas.plot(0.0, 0.0, marker="*", ms=15, color=INK, mec="white", mew=0.8, ls="none")
 
 
 def _cycle(count: int) -> list[str]:
     return [COLOURS[i % len(COLOURS)] for i in range(count)]
 
 
-def _intersection(canvas: Axes, plane: Plane, given: list[Sectors], part: Part, extent: float) -> None:
-    if part.desired_direction is None:
-        return
-    need = need_map(plane, given, 0.8, extent)
-    side = np.linspace(-extent, extent, len(need))
-    level = 1.25 * part.evidence["pyramid_angle_rad"]
-    if need.min() < level:
-        canvas.contour(side, side, need, levels=[level], colors=INK, linewidths=2.0)
-    canvas.plot(0.0, 0.0, marker="*", ms=15, color=INK, mec="white", mew=0.8, ls="none")
-
-
 def _frame_marks(canvas: Axes, plane: Plane, extent: float) -> None:
-    """Where the axes of the frame pierce the picture."""
     canvas.axhline(0.0, color=GREY, lw=0.6, zorder=0)
     canvas.axvline(0.0, color=GREY, lw=0.6, zorder=0)
     for k in range(3):
@@ -105,7 +120,7 @@ def _legend(canvas: Axes, count: int, part: Part) -> None:
     labels = [f"demonstration {i + 1}" for i in range(count)]
     if part.desired_direction is not None:
         handles += canvas.plot([], [], color=INK, lw=2.0) + canvas.plot([], [], marker="*", color=INK, ms=11, ls="none")
-        labels += ["explains all", "chosen"]
+        labels += ["explains most", "chosen"]
     columns = min(len(handles), 4)
     canvas.legend(handles, labels, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, frameon=False)
 
@@ -161,7 +176,7 @@ def _triple(axis: Float) -> str:
 
 
 def work(evidence: dict[str, dict[str, Any]]) -> Figure:
-    """Work of teacher and environment, each part apart."""
+    """Work of teacher and environment, by part."""
     figure = Figure(figsize=(6.4, 0.9 + 0.9 * len(evidence)), layout="constrained")
     canvas = figure.add_subplot()
     for row, (_, seen) in enumerate(evidence.items()):

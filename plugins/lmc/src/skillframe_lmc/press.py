@@ -1,29 +1,21 @@
-r"""Standing force: what a tool that stands while it is pushed says of the push.
+r"""Standing force: the push of a tool that is pressed at rest.
 
-Intervals are cut by path, so that a press - a way through the air, then a force on a surface that does not give way -
-has no interval in contact, and the way alone would decide. The sector between the motion v and the push -F of an
-interval (`sectors`) has an equation at v -> 0 too: nothing moves for any push within the friction cone about the
-normal, and what the teacher exerted is -F itself. A standing stretch therefore votes with the sector of no width,
+A press on a rigid surface has no interval in contact, as these are cut by path. At rest nothing moves for any push
+within the friction cone, and the teacher's push is -F, so rest votes every 0.1 s with a sector of no width,
 
-    v := -F / |F|,        angle(D, v) <= alpha + beta,
+    v := -F / |F|,        angle(D, v) <= alpha + beta.
 
-once for each 0.1 s. A demonstration was pressed if, beyond half of its excursion, the tool stood for 0.5 s in all under
-a force of twice what it met on its way (and at least what counts as contact), within 45 degrees of the way's chord.
-Its motion then votes only where it met as much, and half of the standing force: what a wrench reads in the air -
-inertia, what is left of the weight, a teacher's grip - is no contact and says nothing of a sector. Nor did the
-environment turn the tool aside where it did not touch, so that compliant axes come from the motion in contact, if it is
-long enough to be a motion. All of these figures are our choice.
+A demonstration was pressed if, beyond half of its excursion, the tool rested for 0.5 s under twice the force on its way
+(at least the contact limit), within 45 degrees of the way's chord. Its motion votes, and gives compliant axes, only
+where it met that force and half of the standing one; smaller readings are inertia, weight or grip.
 
-Standing force is asked only if every demonstration was pressed: where the motion alone gives no direction, and where
-nothing was met on the way (its median force is under 0.15 of the standing one, and fewer than three intervals are in
-contact). In the second case sectors of the way hold nothing but what the sensor reads in the air, and the push is
+It is used only if every demonstration was pressed: where the motion gives no direction, and where nothing was met on
+the way (median force under 0.15 of the standing one, fewer than three intervals in contact). Then the push is
 
     D ~ u / s^2 + f / p^2,      u = mean of the headings over 0.1 s of the way, f = mean of the votes,
 
-two measures of one direction weighed by their variances (maximum likelihood of two normal errors). s is the standard
-error of u, from the scatter of its headings over 0.5 s, of which half count, because a wandering hand's neighbouring
-ones are alike, and at least 2 degrees. So a bent way counts little. p is
-5 degrees: a hand that stands leans on one side throughout, so that its own scatter tells nothing of that.
+weighted by variances (maximum likelihood). s is the standard error of u from headings over 0.5 s, half of them
+independent, at least 2 degrees. p is 5 degrees, because a teacher at rest leans to one side throughout.
 """
 
 from __future__ import annotations
@@ -40,7 +32,7 @@ from skillframe_lmc.intervals import BLOCK_S, Motion, Track, moving_blocks, touc
 from skillframe_lmc.sectors import Sectors, sectors
 
 LEAST_STANDING, VOTE_S = 0.5, 0.1  # s
-HARDER, IN_CONTACT = 2.0, 0.5  # against the way's median force; share of the standing force
+HARDER, IN_CONTACT = 2.0, 0.5  # times the way's median force; share of the standing force
 ALONG = cos(radians(45.0))
 AIR, FEWEST_TOUCHED = 0.15, 3  # median force of the way against the standing one; intervals in contact
 HEADING_S, WANDER_S = 0.1, 0.5  # s
@@ -48,13 +40,13 @@ LEAST_ERROR, LEANING = radians(2.0), radians(5.0)
 
 
 class Press(NamedTuple):
-    """One demonstration's standing force.
+    """Standing force of one demonstration.
 
     Attributes:
         votes: (K, 3) unit directions of the teacher's push, one for each 0.1 s.
-        force: median strength [N].
-        seconds: how long the tool stood under it.
-        motion: the demonstration's motion, its intervals in contact only.
+        force: median [N].
+        seconds: duration of rest under it.
+        motion: the demonstration's intervals in contact.
         way: (3,) mean heading of the way there, unit vector.
         error: standard error of that heading [rad].
         resistance: median force on the way [N].
@@ -75,12 +67,12 @@ class Press(NamedTuple):
 
     @property
     def push(self) -> Float:
-        """The push (3,) that way and standing force tell together, weighed by their variances."""
+        """Push (3,) of way and standing force, weighted by their variances."""
         return unit(self.way / self.error**2 + unit(self.votes.mean(axis=0)) / LEANING**2)
 
     @property
     def sectors(self) -> Sectors:
-        """The sectors of the motion in contact, and those of the standing force, which have no width."""
+        """Sectors of the motion in contact, and those of no width of the standing force."""
         moved, count = sectors(self.motion), len(self.votes)
         return Sectors(
             np.concatenate([moved.motion, self.votes]), np.concatenate([moved.push, np.zeros((count, 3))]),
@@ -89,13 +81,13 @@ class Press(NamedTuple):
 
 
 def presses(tracks: Sequence[Track], motions: Sequence[Motion]) -> list[Press] | None:
-    """The standing force of every demonstration, or None if one was not pressed."""
+    """Standing force of every demonstration, or None if one was not pressed."""
     found = [p for track, motion in zip(tracks, motions, strict=True) if (p := press(track, motion)) is not None]
     return found if found and len(found) == len(tracks) else None
 
 
 def press(track: Track, motion: Motion) -> Press | None:
-    """The standing force of one demonstration, or None if it was not pressed."""
+    """Standing force of one demonstration, or None if it was not pressed."""
     away = norm(track.position - track.position[0])
     moves = np.append(moving_blocks(np.diff(track.position, axis=0), np.diff(track.time)), 0.0) > 0.0
     strength = norm(track.force)
@@ -117,7 +109,7 @@ def press(track: Track, motion: Motion) -> Press | None:
 
 
 def _heading(position: Float, moves: NDArray[np.bool_]) -> tuple[Float, float]:
-    """Mean heading (3,) of a way in blocks (B, 3), each moment counted once, and its standard error per axis [rad]."""
+    """Mean heading (3,) of a way in blocks (B, 3), by time, and its standard error per axis [rad]."""
     ahead = round(HEADING_S / BLOCK_S)
     steps = (position[ahead:] - position[:-ahead])[moves[:-ahead] & moves[ahead:]]
     size = round(WANDER_S / BLOCK_S)

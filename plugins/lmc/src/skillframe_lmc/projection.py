@@ -1,17 +1,13 @@
-r"""Directions as points of a plane: azimuthal equidistant about a centre, in degrees.
+r"""Azimuthal equidistant projection of directions about a centre, in degrees.
 
-A direction at the angle a from the centre is drawn at the distance a, whichever way it lies; straight pictures up to
-180 degrees, where a gnomonic one ends at 90.
+A direction at the angle a from the centre is drawn at the distance a, up to 180 degrees.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from skillframe.frames import Float, cross, norm, unit
-from skillframe_lmc.sectors import Sectors, misses
 
 
 class Plane:
@@ -19,7 +15,7 @@ class Plane:
 
     Attributes:
         centre: (3,) direction drawn at the origin.
-        right, up: (3,) unit tangents, the axes of the frame that lie nearest to the plane, projected into it.
+        right, up: (3,) unit tangents: the projected axes of the frame nearest to the plane.
         labels: their names.
     """
 
@@ -64,16 +60,3 @@ def outline(v: Float, m: Float, contact: bool, alpha: float, count: int = 24) ->
     along = np.cos(angle) * v + np.sin(angle) * e
     upper, lower = np.cos(alpha) * along + np.sin(alpha) * n, np.cos(alpha) * along - np.sin(alpha) * n
     return np.concatenate([upper, lower[::-1]])
-
-
-def need_map(plane: Plane, given: Sequence[Sectors], quantile: float, extent: float, count: int = 121) -> Float:
-    """The alpha (count, count) [rad] that all demonstrations need to accept the directions of a square of the plane."""
-    side = np.linspace(-extent, extent, count)
-    points = np.stack(np.meshgrid(side, side), axis=-1).reshape(-1, 2)
-    directions = plane.to_sphere(points)
-    result = np.full(len(points), -np.inf)
-    for sectors in given:
-        need = misses(directions, sectors)[0]
-        k = int(np.ceil(quantile * need.shape[1] - 1e-9)) - 1
-        result = np.maximum(result, np.partition(need, k, axis=1)[:, k])
-    return result.reshape(count, count)

@@ -1,14 +1,11 @@
-r"""The LMC skill in the loop: equation (2) with a limit on the lead, for N trials at once.
+r"""LMC skill for N trials: equation (2) with a limit on the lead.
 
     x_d = x_0 + s v_d,      s <- min(s + nu dt,  (x - x_0).v_d + L)               (2), with the limit L = F_lead / k
     R_d = exp(theta w_d) R_0,      theta <- theta + lambda dt - max(0, (error about w_d) - L_o)
 
-As printed, (2) is driven by time alone, so a blocked tool would push with K nu t; the limit on the lead is ours. The
-first desired pose is the measured one. Stiffness is zero along compliant axes. Damping is left to the controller,
-which designs it from the task-space inertia (the file's damping is the nominal design). The phase ends with SUCCESS
-where the push has come to rest, with FAILURE at a limit of force, time or travel; whether the task is done is for the
-world to say. Every row is computed by itself, element by element, so a trial's commands do not depend, to the last
-bit, on its neighbours.
+Without the limit a blocked tool would push with K nu t. The controller designs the damping. The phase ends with SUCCESS
+where the push has come to rest, with FAILURE at a limit of force, time or travel. A trial's commands do not depend, to
+the last bit, on the others.
 """
 
 from __future__ import annotations
@@ -20,20 +17,20 @@ from numpy.typing import NDArray
 
 from skillframe.document.frame import read_frame
 from skillframe.extend.records import Document
-from skillframe.frames import Float, Pose, rotate, rotation_matrix, rotation_vector
+from skillframe.frames import Float, Pose, dot, rotate, rotation_matrix, rotation_vector
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons, rows_of
 from skillframe_lmc.phase import Part, Phase, read_phase
 from skillframe_lmc.stall import StallWatch
 
-RUNNING = int(Status.RUNNING)  # a look into the enumeration takes as long as a sum over the batch
-PUSHING = 0.5  # of the lead limit: less is not yet a push that could stall
+RUNNING = int(Status.RUNNING)  # enumeration access is slow in the loop
+PUSHING = 0.5  # of the lead limit: less is no push that could stall
 
 
 def build(document: Document) -> LmcSkill:
     """The skill of a document.
 
     Raises:
-        InputError: the document's phase is not as it should be.
+        InputError: the document's phase is invalid.
     """
     return LmcSkill(read_phase(document), read_frame(document).from_start)
 
@@ -42,8 +39,8 @@ class LmcSkill(Skill):
     """One linear motion with compliance.
 
     Args:
-        phase: what was learned.
-        in_start_attitude: directions are those of the tool's attitude at the start of the phase, not of base.
+        phase: the learned phase.
+        in_start_attitude: directions refer to the tool's orientation at the start, not to base.
     """
 
     def __init__(self, phase: Phase, in_start_attitude: bool) -> None:
@@ -51,7 +48,7 @@ class LmcSkill(Skill):
         self._in_start_attitude = in_start_attitude
 
     def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
-        """Take the measured pose as the first desired one, and turn the directions into base."""
+        """Take the measured pose as the first desired one, and rotate the directions into base."""
         n = len(rngs)
         self._home = Pose(observation.pose.position.copy(), observation.pose.rotation.copy())
         self._began = observation.time.copy()
@@ -69,7 +66,7 @@ class LmcSkill(Skill):
     def restart(
         self, rows: NDArray[np.intp], observation: Observation, rngs: Sequence[np.random.Generator]
     ) -> None:  # fmt: skip
-        """Start again in some trials, from where their tools are now."""
+        """Start again in the given trials."""
         some = rows_of(observation, rows)
         fresh = LmcSkill(self._phase, self._in_start_attitude)
         fresh.start(some, rngs)
@@ -90,7 +87,7 @@ class LmcSkill(Skill):
         self._fresh[rows] = True
 
     def _stiffness(self, turn: Float) -> Float:
-        """(6, 6) in base axes, or (N, 6, 6) where each trial started in its own attitude."""
+        """(6, 6) in base axes, or (N, 6, 6) where each trial started in its own orientation."""
         turn = turn if self._in_start_attitude else turn[:1]
         result = np.zeros((len(turn), 6, 6))
         back = np.swapaxes(turn, -1, -2)
@@ -100,11 +97,11 @@ class LmcSkill(Skill):
         return result if self._in_start_attitude else result[0]
 
     def step(self, observation: Observation) -> Command:
-        """Advance the desired pose and look whether the phase has ended."""
+        """Advance the desired pose and check for the end."""
         dt = observation.dt if self._fresh is None else np.where(self._fresh, 0.0, observation.dt)
         self._fresh = None
         travel = observation.pose.position - self._home.position
-        pushing = self._push.advance(dt, _dot(travel, self._push.direction))
+        pushing = self._push.advance(dt, dot(travel, self._push.direction))
         position = self._home.position + self._push.progress[:, None] * self._push.direction
         rotation, turning = self._home.rotation, None
         if self._turn.exists:
@@ -117,31 +114,30 @@ class LmcSkill(Skill):
         wanted = self._turn.progress + self._turn.speed * dt
         desired = self._attitude(wanted)
         error = rotation_vector(desired @ np.swapaxes(observation.pose.rotation, -1, -2))
-        pushing = self._turn.advance(dt, wanted - _dot(error, self._turn.direction))
+        pushing = self._turn.advance(dt, wanted - dot(error, self._turn.direction))
         return self._attitude(self._turn.progress), pushing
 
     def _attitude(self, angle: Float) -> Float:
         return rotation_matrix(angle[:, None] * self._turn.direction) @ self._home.rotation
 
     def _judge(self, observation: Observation, travel: Float, pushing: NDArray[np.bool_]) -> None:
-        """End the trials that have stalled or met a limit. The first reason stays."""
         stop, elapsed = self._stop, observation.time - self._began
         stalled = self._stall.look(observation, pushing)
         force = observation.wrench[:, :3]
-        over = _dot(force, force) > stop.force_limit_n**2
+        over = dot(force, force) > stop.force_limit_n**2
         late = elapsed >= stop.time_limit_s
-        far = _dot(travel, travel) > stop.travel_limit_m**2
+        far = dot(travel, travel) > stop.travel_limit_m**2
         if self._turn.exists:
             far |= np.abs(self._turn.progress) > stop.turn_limit_rad
         ending = (self._status == RUNNING) & (stalled | over | late | far)
         for i in np.flatnonzero(ending).tolist() if np.count_nonzero(ending) else ():
             self._status[i], self._reason[i] = self._verdict(
-                i, bool(over[i]), bool(far[i]), bool(stalled[i]), travel[i], float(np.sqrt(_dot(force, force)[i]))
+                i, bool(over[i]), bool(far[i]), bool(stalled[i]), travel[i], float(np.sqrt(dot(force, force)[i]))
             )
 
     def _verdict(self, i: int, over: bool, far: bool, stalled: bool, travel: Float, force: float) -> tuple[int, str]:
         stop = self._stop
-        moved = 1e3 * float(np.sqrt(_dot(travel[None], travel[None])[0]))
+        moved = 1e3 * float(np.sqrt(dot(travel[None], travel[None])[0]))
         if over:
             return Status.FAILURE, f"contact force {force:.0f} N above the limit of {stop.force_limit_n:.0f} N"
         if far:
@@ -154,7 +150,7 @@ class LmcSkill(Skill):
 
 
 class _Advance:
-    """Progress of the desired pose along (or about) a direction, ahead of the measured one by no more than a limit.
+    """Progress of the desired pose along (or about) a direction, with a limited lead over the measured one.
 
     Attributes:
         direction: (N, 3) in base; zero if there is none.
@@ -173,7 +169,7 @@ class _Advance:
         self._limit = push / stiffness if stiffness > 0.0 else np.inf
 
     def advance(self, dt: float | Float, reached: Float) -> NDArray[np.bool_]:
-        """Move on, but not ahead of what is `reached` (N,) by more than the limit. Says who is pushing."""
+        """Move on within the limit over `reached` (N,), and return which trials push."""
         if not self.exists:
             return np.zeros(len(self.progress), dtype=bool)
         self.progress = np.minimum(self.progress + self.speed * dt, reached + self._limit)
@@ -181,14 +177,8 @@ class _Advance:
         return pushing
 
     def replace(self, rows: NDArray[np.intp], other: _Advance) -> None:
-        """Take over some trials from another one that has only those."""
+        """Take over some trials from another that has only those."""
         for name in ("direction", "progress", "velocity"):
             values = getattr(self, name).copy()
             values[rows] = getattr(other, name)
             setattr(self, name, values)
-
-
-def _dot(a: Float, b: Float) -> Float:
-    """Row-wise dot product (N,) of (N, 3) arrays in one fixed order of additions."""
-    result: Float = a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
-    return result

@@ -1,20 +1,18 @@
-r"""Sectors and pyramids: which pushes explain an interval of motion, and by how much others miss.
+r"""Sectors and pyramids: the pushes that explain an interval of motion, and the miss of others.
 
-A tool that slides along \(\hat v\) against a contact force \(F_m\) slides the same way for every push inside the sector
-between \(\hat v\) and \(-\hat F_m\) (Fig. 5 of the overview paper); for Coulomb friction it is 90 degrees - atan(mu)
-wide. A person wavers, so the sector is widened to a pyramid (Fig. 8): by alpha out of its plane and by beta beyond its
-two edges. With n = v x m, m = unit(-F_m), w the angle from v to m, e = n x v, a direction D lies
+A tool that slides along \(\hat v\) against a contact force \(F_m\) slides alike for every push in the sector between
+\(\hat v\) and \(-\hat F_m\) (Fig. 5 of the overview paper), 90 degrees - atan(mu) wide for Coulomb friction. For a
+teacher's wavering, a pyramid (Fig. 8) widens it by alpha out of its plane and by beta beyond its edges. With n = v x m,
+m = unit(-F_m), w the angle from v to m, e = n x v, a direction D lies
 
     out = |asin D.n| out of the plane,   ins = min(ang, w - ang) inside the edges,   ang = atan2(D.e, D.v),
 
-where behind the sector, from ang = w / 2 - pi down, the edge m is the nearer one: ins = w - 2 pi - ang.
+where behind the sector, from ang = w / 2 - pi down, the edge m is the nearer one: ins = w - 2 pi - ang. With beta =
+max(5 degrees, alpha / 3), the least alpha that accepts D is
 
-We take beta = max(5 degrees, alpha / 3), so the least alpha that accepts D has a closed form,
+    a(D) = max(out, 0 if ex <= 5 degrees else 3 ex),   ex = max(0, -ins).
 
-    a(D) = max(out, 0 if ex <= 5 degrees else 3 ex),   ex = max(0, -ins),
-
-and no loop over alpha is needed. Without contact (or with the load along the motion) the teacher pushed where the tool
-went: the cone angle(D, v) <= alpha + beta.
+Without contact (or with the load along the motion) it is a cone: angle(D, v) <= alpha + beta.
 """
 
 from __future__ import annotations
@@ -30,7 +28,7 @@ from skillframe.frames import Float, cross, norm, unit
 from skillframe_lmc.intervals import Motion
 
 BETA_MIN = np.float32(radians(5.0))
-DEEP = np.float32(0.6)  # deeper inside a sector than this hardly counts as better
+DEEP = np.float32(0.6)  # rad inside a sector; more hardly counts as better
 Float32 = NDArray[np.float32]
 
 
@@ -59,9 +57,8 @@ def sectors(motion: Motion, *, teacher_driven_only: bool = False) -> Sectors:
 
     Args:
         motion: the part.
-        teacher_driven_only: leave out contact in which the environment did the work. For rotations: there the angle
-            between axis and push exceeds 90 degrees, the sector is nearly a half circle through a random plane, and
-            both +y and -y would be accepted.
+        teacher_driven_only: leave out contact in which the environment did the work, for rotations: the axis is over 90
+            degrees from the push, and the sector, nearly a half circle through a random plane, accepts both +y and -y.
     """
     size = norm(motion.load)
     keep = (motion.work <= 0.0) | (size < motion.load_min) if teacher_driven_only else np.ones(len(size), dtype=bool)
@@ -72,21 +69,21 @@ def sectors(motion: Motion, *, teacher_driven_only: bool = False) -> Sectors:
 
 
 def concatenated(demonstrations: Sequence[Sectors]) -> Sectors:
-    """Sectors of several demonstrations as if one had shown them all, one after another."""
+    """Sectors of several demonstrations as those of one."""
     motion, push, contact = (np.concatenate(parts) for parts in zip(*demonstrations, strict=True))
     return Sectors(motion, push, contact)
 
 
 def misses(directions: Float, given: Sectors) -> tuple[Float32, Float32]:
-    """What each direction lacks, and how deep it lies.
+    """Miss and depth of directions.
 
     Args:
         directions: (C, 3) unit vectors.
         given: K sectors.
 
     Returns:
-        The least alpha (C, K) that makes each interval's pyramid accept each direction, and the depth (C, K) inside
-        the sector less the distance out of its plane [rad].
+        The least alpha (C, K) at which each interval accepts each direction, and the depth (C, K) inside the sector
+            less the distance out of its plane [rad].
     """
     D = directions.astype(np.float32)
     touching, free = given.contact, ~given.contact
@@ -108,7 +105,7 @@ def _contact(D: Float32, v: Float, m: Float) -> tuple[Float32, Float32]:
     inside = np.maximum(np.minimum(angle, w - angle), w - np.float32(2.0 * np.pi) - angle)
     beyond = -inside
     need = np.maximum(out, np.where(beyond <= BETA_MIN, np.float32(0.0), np.float32(3.0) * beyond))
-    # past DEEP a little still counts, so that the middle of two wide sectors is not a plateau
+    # slope beyond DEEP, so that the middle of two wide sectors is no plateau
     return need, np.minimum(inside, DEEP + np.float32(0.05) * (inside - DEEP)) - out
 
 

@@ -2,7 +2,6 @@
 
 The octahedral equal-area map (Clarberg 2008) takes the square [-1, 1]^2 to the sphere: with d = 1 - |u| - |v|, r = 1 -
 |d| and phi = pi/4 ((|v| - |u|)/r + 1), a point has z = sign(d) (1 - r^2) and lies at r sqrt(2 - r^2) from the axis.
-Equal areas make a solid angle a count, and children make a coarse-to-fine search exact bookkeeping.
 """
 
 from __future__ import annotations
@@ -30,14 +29,14 @@ def whole(resolution: int) -> tuple[Cells, Float]:
 
 
 def children(cells: Cells) -> Cells:
-    """The four children (4 C, 2) of cells (C, 2), on the level of twice the resolution."""
+    """The four children (4 C, 2) of cells (C, 2), at twice the resolution."""
     offsets = np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
     result: Cells = (2 * cells[:, None, :] + offsets).reshape(-1, 2)
     return result
 
 
 def centres(cells: Cells, resolution: int) -> Float:
-    """Unit vectors (C, 3) of cells (C, 2): the equal-area map of their centres."""
+    """Unit vectors (C, 3) of the centres of cells (C, 2)."""
     uv = (cells + 0.5) * (2.0 / resolution) - 1.0
     size = np.abs(uv)
     outside = 1.0 - size.sum(-1)

@@ -1,7 +1,7 @@
-"""When a push has come to rest: nothing has moved for a while, while the desired pose leads (our choice).
+"""Detect that a push has come to rest: nothing has moved for a while, while the desired pose leads.
 
-Position and attitude are low-passed over 50 ms first, so that sensor noise of the order of the threshold does not look
-like motion. What counts as moving is a distance from where the tool last moved, per coordinate.
+Position and orientation are low-passed over 50 ms against sensor noise. Motion is a distance per coordinate from where
+the tool last moved.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ class StallWatch:
         return seen
 
     def forget(self, rows: NDArray[np.intp], observation: Observation) -> None:
-        """Watch some trials again from an observation of them alone."""
+        """Restart the watch of some trials from an observation of them alone."""
         if self._smooth is not None:
             seen = self._seen(observation)
             self._smooth[rows], self._anchor[rows], self._since[rows] = seen, seen, observation.time
 
     def look(self, observation: Observation, pushing: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Which trials have been at rest for `stall_s` and are pushing now (N,)."""
+        """Trials (N,) that have been at rest for `stall_s` and are pushing."""
         seen = self._seen(observation)
         if self._smooth is None:
             self._smooth, self._anchor, self._since = seen, seen.copy(), observation.time.copy()

@@ -1,4 +1,4 @@
-"""Directions and speeds in words a person reads without a calculator."""
+"""Directions and speeds in words."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def _near(axis: Float) -> bool:
 
 
 def exact_words(direction: Float) -> str:
-    """Components, and how far from the nearest axis."""
+    """Components, and the angle to the nearest axis."""
     k = int(np.argmax(np.abs(direction)))
     off = degrees(np.arccos(min(1.0, abs(float(direction[k])))))
     name = ("-" if direction[k] < 0.0 else "+") + "xyz"[k]

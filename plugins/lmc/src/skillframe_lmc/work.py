@@ -1,16 +1,13 @@
-r"""Who moved the tool: three degrees of freedom are compliant if the environment did more work than the teacher.
+r"""Work of environment and teacher: a part is fully compliant if the environment did more.
 
-    W = F_m . dx   (translation),    W = T_m . dbeta   (rotation, T_m at the hand)          (3) of the overview paper
+    W = F_m . dx   (translation),    W = T_m . dbeta   (rotation, T_m at the grip)          (3) of the overview paper
 
-F_m and T_m are the environment's, so positive work is the environment's and negative work the teacher's. Sliding with
-friction always takes work from the teacher; levering a peg round an edge drives the wrist. The part is fully compliant
-if the environment's share exceeds one half by more than chance makes of even shares (ours),
+F_m and T_m are the environment's, so the teacher's work is negative. The environment's share must exceed one half
+significantly (95 % one-sided for independent signs, as an unsteady alignment has a share near one half),
 
-    W+ - W- > 1.64 sqrt(sum_k W_k^2),
+    W+ - W- > 1.64 sqrt(sum_k W_k^2).
 
-95 % one-sided for intervals whose signs are independent: a shaky alignment turns to and fro and ends with a share
-anywhere near one half, while levering has a share of one. Intervals without contact, and those whose load is within 5
-degrees of square to the motion, have work that is noise and do not count (ours).
+Intervals without contact, or with a load within 5 degrees of perpendicular to the motion, do not count.
 """
 
 from __future__ import annotations
@@ -28,7 +25,7 @@ CERTAIN = 1.64  # standard errors, 95 % one-sided
 
 
 class Work(NamedTuple):
-    """Work over the intervals that count, in joules, both positive, and the root of their sum of squares."""
+    """Work [J] of the intervals that count, both positive, and the root of their sum of squares."""
 
     teacher: float
     environment: float
@@ -42,7 +39,7 @@ class Work(NamedTuple):
 
     @property
     def environment_drove(self) -> bool:
-        """The environment did more, by more than chance makes of even shares."""
+        """Whether the environment did significantly more."""
         return self.environment - self.teacher > CERTAIN * self.scatter
 
 

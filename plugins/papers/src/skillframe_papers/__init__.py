@@ -1,8 +1,7 @@
-"""skillframe plug-in: the papers' results, row by row, and the command `skillframe reproduce` that computes them.
+"""Plug-in for the papers' results, row by row, and the command `skillframe reproduce`.
 
-Read `published` (the rows, with what ours must reach), `rows` (a module a subject: how each is computed), `jobs` (what
-is to be computed), `runner` (each group of rows in a process), `store` (what is kept), `page` and `document` (what is
-shown), `committed` (has a verdict changed?). This module is all that `skillframe --help` imports.
+Reading order: `published` (rows and thresholds), `rows` (computation), `jobs`, `runner`, `store`, `page`, `document`,
+`committed`. `skillframe --help` imports this module only.
 """
 
 from skillframe.extend.commands import LazyCommand

@@ -1,4 +1,4 @@
-"""`skillframe reproduce`: the papers' results beside ours, computed again."""
+"""`skillframe reproduce`: published results, recomputed."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from skillframe.cli.interrupts import terminable
-from skillframe.cli.numbers import COUNT, SEED
-from skillframe.cli.output import note, quiet_option
+from skillframe.cli.options import COUNT, SEED
+from skillframe.cli.output import note, terminable
 
 if TYPE_CHECKING:
     from skillframe_papers.runner import Outcome
@@ -29,7 +28,6 @@ if TYPE_CHECKING:
 @click.option("--fresh", is_flag=True, help="Compute rows again that OUT holds already.")
 @click.option("--list", "only_list", is_flag=True, help="List rows and their settings, compute nothing.")
 @click.option("--json", "as_json", is_flag=True, help="The table as JSON on stdout.")
-@quiet_option
 def command(
     rows: tuple[str, ...], out: Path, quick: bool, settings: tuple[str, ...], seed: int, workers: int | None,
     fresh: bool, only_list: bool, as_json: bool,
@@ -55,7 +53,12 @@ def command(
         return _list([registry().row(job.row) for job in jobs], as_json)
     with terminable() as code:
         outcome = run(jobs, out, workers=workers or os.cpu_count() or 1, fresh=fresh, tell=note)
-    _write(outcome.entries, out)
+    from skillframe.files import write_whole
+    from skillframe_papers import document, page, store
+
+    store.write_table(out, outcome.entries)
+    write_whole(out / "reproduce.html", page.render(outcome.entries).encode())
+    write_whole(out / "reproduce.md", document.render(outcome.entries).encode())
     return _end(outcome, out, quick, as_json, code())
 
 
@@ -67,22 +70,17 @@ def _list(rows: Sequence[Any], as_json: bool) -> int:
     if as_json:
         emit_json(found)
     else:
-        lines = [(f["row"], f["summary"], f["published"], _settings(f["settings"])) for f in found]
+        lines = [
+            (
+                f["row"],
+                f["summary"],
+                f["published"],
+                ", ".join(f"{key}={value}" for key, value in f["settings"].items()),
+            )
+            for f in found
+        ]
         table(("row", "what", "published", "settings"), lines, PAGE_WIDTH)
     return 0
-
-
-def _settings(values: Mapping[str, Any]) -> str:
-    return ", ".join(f"{key}={value}" for key, value in values.items())
-
-
-def _write(entries: Sequence[Mapping[str, Any]], out: Path) -> None:
-    from skillframe.files import write_whole
-    from skillframe_papers import document, page, store
-
-    store.write_table(out, entries)
-    write_whole(out / "reproduce.html", page.render(entries).encode())
-    write_whole(out / "reproduce.md", document.render(entries).encode())
 
 
 def _end(outcome: Outcome, out: Path, quick: bool, as_json: bool, interrupted: int) -> int:
@@ -111,7 +109,7 @@ def _end(outcome: Outcome, out: Path, quick: bool, as_json: bool, interrupted: i
 def _show(entries: Sequence[Mapping[str, Any]], as_json: bool) -> None:
     from skillframe.cli.output import PAGE_WIDTH, emit_json, table
     from skillframe_papers import store
-    from skillframe_papers.counts import with_intervals
+    from skillframe_papers.bars import with_intervals
 
     if as_json:
         emit_json(store.table(entries))

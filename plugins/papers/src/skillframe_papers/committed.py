@@ -1,4 +1,4 @@
-"""Has a verdict changed? The verdicts that the docs show ship with this package, for full and quick runs."""
+"""Changes against the verdicts that ship with this package and appear in the docs."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ FOLDER = Path(__file__).parent / "reproduced"
 
 
 def verdicts(*, quick: bool) -> dict[str, str]:
-    """Verdict by row as committed, of a full or of a quick run.
+    """Committed verdict by row, of a full or of a quick run.
 
     Raises:
         InputError: the file that ships with the package is missing or damaged.
@@ -22,7 +22,7 @@ def verdicts(*, quick: bool) -> dict[str, str]:
 
 
 def changes(entries: Sequence[Mapping[str, Any]], committed: Mapping[str, str]) -> list[str]:
-    """A sentence for every row whose verdict is not the committed one. Rows that are not committed are passed over."""
+    """A sentence for every committed row whose verdict differs."""
     return [
         f"row {each['row']} is {each['verdict']!r}, the docs say {committed[each['row']]!r}"
         for each in entries

@@ -1,11 +1,11 @@
-"""The table as a page of the docs, in Markdown: written by the command, committed as it is."""
+"""The table of results as Markdown, for `skillframe reproduce` and the docs."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from skillframe_papers.counts import SAID, with_intervals
+from skillframe_papers.bars import SAID, with_intervals
 
 HEAD = ("row", "what", "published", "ours", "verdict", "values")
 ORIGINS = {
@@ -16,39 +16,38 @@ ORIGINS = {
 
 
 def render(entries: Sequence[Mapping[str, Any]]) -> str:
-    """The page. The same rows give the same text but for wall times."""
+    """The table with its title, reproducible but for wall times."""
+    return f"# The papers' results, row by row\n\n{body(entries)}"
+
+
+def body(entries: Sequence[Mapping[str, Any]]) -> str:
+    """The command, counts of verdicts, the table of rows, and a section for each."""
     wall, cpu = (sum(each[key] for each in entries) / 60.0 for key in ("wall_s", "cpu_s"))
-    lines = [
-        "# The papers' results, row by row", "",
-        "Written by `skillframe reproduce`; do not edit. [How to read it](reproduce.md).", "",
-        "```text", _command(entries), "```", "",
-        f"{len(entries)} rows, {_count(entries, 'pass')} pass, {_count(entries, 'fail')} fail, "
-        f"{_count(entries, 'reported')} are reported without a verdict. One after another they took {wall:.1f} "
-        f"minutes, and {cpu:.1f} minutes of processor time, which several cores share. {SAID}", "",
-        _row(HEAD), _row(["---"] * len(HEAD)),
-    ]  # fmt: skip
     keys = ("row", "summary", "published", "ours", "verdict", "values_are")
-    lines += [_row([_shown(key, each[key]) for key in keys]) for each in entries]
+    seeds, quick = {each["seed"] for each in entries}, any(each["quick"] for each in entries)
+    seed = f" --seed {seeds.pop()}" if len(seeds) == 1 else ""
+    lines = [
+        "```text", f"skillframe reproduce{' --quick' if quick else ''}{seed} --out reproduce", "```", "",
+        f"{len(entries)} rows: {_count(entries, 'pass')} pass, {_count(entries, 'fail')} fail, "
+        f"{_count(entries, 'reported')} reported without a verdict. All rows took {wall:.1f} minutes of wall time and "
+        f"{cpu:.1f} minutes of processor time. {SAID}", "",
+        _row(HEAD), _row(["---"] * len(HEAD)),
+        *(_row([_shown(key, each[key]) for key in keys]) for each in entries),
+    ]  # fmt: skip
     for each in entries:
         lines += ["", *_details(each)]
     return "\n".join(lines) + "\n"
 
 
-def _command(entries: Sequence[Mapping[str, Any]]) -> str:
-    seeds, quick = {each["seed"] for each in entries}, any(each["quick"] for each in entries)
-    seed = f" --seed {seeds.pop()}" if len(seeds) == 1 else ""
-    return f"skillframe reproduce{' --quick' if quick else ''}{seed} --out reproduce"
-
-
 def origin(each: Mapping[str, Any]) -> str:
-    """Whether our figure was predicted, or what was chosen with the published one or with the worlds in sight."""
+    """Whether the result was predicted, or constants were chosen with it in view."""
     if each["values_are"] == "calibrated":
         return f"calibrated: {each['calibrated']}"
     return ORIGINS[each["values_are"]]
 
 
 def threshold(each: Mapping[str, Any]) -> str:
-    """What ours must be to pass, and why reaching it would show nothing if that is so."""
+    """The threshold, and why reaching it would be weak evidence, if so."""
     if not each["bar"]:
         return "none: reported only"
     weak = each.get("weak")
@@ -64,7 +63,6 @@ def _row(cells: Sequence[object]) -> str:
 
 
 def _shown(key: str, value: object) -> object:
-    """Our figures with intervals behind their counts. What was published stands as it is."""
     return with_intervals(value) if key == "ours" else value
 
 

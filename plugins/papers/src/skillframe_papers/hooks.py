@@ -1,4 +1,4 @@
-"""What skillframe-papers registers. This module is all that is imported when plug-ins are listed."""
+"""Hooks of skillframe-papers, the only module that listing plug-ins imports."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which rows are to be computed, and with which settings: everything that a row's figure follows from."""
+"""Rows to compute, with all settings that determine their results."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ class Job:
         settings: all of the row's settings.
         changed: those that `--set` changed.
         seed, quick: see `RowRun`.
-        version: of the distribution that brings the row.
-        group: jobs of one group are done in one process.
+        version: of the distribution that provides the row.
+        group: jobs of one group share a process.
     """
 
     row: str
@@ -38,13 +38,13 @@ class Job:
 
     @property
     def key(self) -> str:
-        """Equal for jobs whose results are equal."""
+        """Equal for jobs with equal results."""
         text = json.dumps(asdict(self), sort_keys=True, default=str)
         return hashlib.sha256(text.encode()).hexdigest()[:16]
 
     @property
     def command(self) -> str:
-        """What to type to compute this row again."""
+        """Command that computes this row again."""
         words = ["skillframe", "reproduce", self.row, "--out", "reproduce", "--seed", str(self.seed)]
         words += ["--quick"] if self.quick else []
         for key, value in sorted(self.changed.items()):
@@ -57,14 +57,14 @@ def _typed(value: Any) -> str:
 
 
 def in_order(names: Sequence[str]) -> list[str]:
-    """Rows by number, then those whose name is none."""
+    """Rows by number, then other names."""
     return sorted(names, key=lambda name: (0, int(name), "") if name.isdigit() else (1, 0, name))
 
 
 def jobs_of(
     registry: Registry, rows: Sequence[str], changed: Mapping[str, Any], *, seed: int, quick: bool
 ) -> list[Job]:
-    """Jobs of some rows, of all if none is named. A setting reaches every one of them that has it.
+    """Jobs of the named rows, or of all, with each setting for every row that has it.
 
     Raises:
         UnknownName: no such row, or a setting that none of them has.

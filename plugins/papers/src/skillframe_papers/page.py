@@ -1,7 +1,4 @@
-"""The page: every row with its published figure, ours, the table behind it and the paper's figures from our data.
-
-One file that reaches for nothing outside; it looks like a report because it takes its parts and style from there.
-"""
+"""Self-contained page of all rows: published and own results, tables and figures, in the style of a report."""
 
 from __future__ import annotations
 
@@ -9,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from importlib.resources import files
 from typing import Any
 
-from skillframe.reports.markup import Markup, data_uri, figure, join, note, table, tag
-from skillframe.reports.shell import POLICY
-from skillframe_papers.counts import SAID, with_intervals
+from skillframe_reports.markup import Markup, data_uri, figure, join, note, table, tag
+from skillframe_reports.shell import POLICY
+
+from skillframe_papers.bars import SAID, with_intervals
 from skillframe_papers.document import origin, threshold
 
 BADGES = {"pass": "badge won", "fail": "badge lost", "reported": "badge"}
@@ -40,30 +38,34 @@ figure img { max-height: 560px; object-fit: contain; }
 
 
 def render(entries: Sequence[Mapping[str, Any]]) -> str:
-    """The whole document. The same rows give the same text."""
+    """The whole document, reproducible."""
+    shared = files("skillframe_reports").joinpath("assets", "page.css").read_text(encoding="utf-8")
     head = tag(
         "head", tag("meta", charset="utf-8"), tag("meta", http_equiv="Content-Security-Policy", content=POLICY),
         tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("title", "skillframe reproduce"), tag("style", _style()),
+        tag("title", "skillframe reproduce"), tag("style", Markup(shared + STYLE)),
     )  # fmt: skip
-    top = tag("nav", tag("span", "skillframe", class_="brand"), tag("div", *_links(entries), class_="links"))
-    body = tag("body", top, tag("main", _hero(entries), *(_section(each) for each in entries)), _foot())
-    return "<!DOCTYPE html>\n" + tag("html", head, body, lang="en")
-
-
-def _links(entries: Sequence[Mapping[str, Any]]) -> list[Markup]:
-    """The rows by topic. Pointed at, a number says what it claims. Rows that an older version kept have no topic."""
     topics: dict[str, list[Markup]] = {}
     for each in entries:
         hint = f"row {each['row']}, {each['verdict']}: {each['summary']}"
         link = tag("a", each["row"], href=f"#row-{each['row']}", title=hint, class_=each["verdict"])
         topics.setdefault(each.get("topic") or "row", []).append(link)
-    return [tag("span", tag("span", topic, class_="topic"), *links) for topic, links in topics.items()]
-
-
-def _style() -> Markup:
-    shared = files("skillframe.reports").joinpath("assets", "page.css").read_text(encoding="utf-8")
-    return Markup(shared + STYLE)
+    top = tag(
+        "nav",
+        tag("span", "skillframe", class_="brand"),
+        tag(
+            "div",
+            *[tag("span", tag("span", topic, class_="topic"), *links) for topic, links in topics.items()],
+            class_="links",
+        ),
+    )
+    body = tag(
+        "body",
+        top,
+        tag("main", _hero(entries), *(_section(each) for each in entries)),
+        tag("footer", "Made by skillframe reproduce from the rows' files alone."),
+    )
+    return "<!DOCTYPE html>\n" + tag("html", head, body, lang="en")
 
 
 def _hero(entries: Sequence[Mapping[str, Any]]) -> Markup:
@@ -91,6 +93,8 @@ def _badge(each: Mapping[str, Any]) -> Markup:
 
 
 def _section(each: Mapping[str, Any]) -> Markup:
+    alone = each["group"] == each["row"]
+    shared = "" if alone else f"; what the rows of {each['group']!r} share is in the time of the first that needs it"
     facts = [
         ("published", f"{each['published']} ({each['source']})"),
         ("ours", with_intervals(each["ours"])),
@@ -98,7 +102,10 @@ def _section(each: Mapping[str, Any]) -> Markup:
         ("values", origin(each)),
         ("difference", with_intervals(each["difference"])),
         ("command", tag("code", each["command"])),
-        ("computed in", _effort(each)),
+        (
+            "computed in",
+            f"{each['wall_s']:.1f} s ({each['cpu_s']:.1f} s of processor time), seed {each['seed']}{shared}",
+        ),
     ]
     listed = tag("dl", *(join([tag("dt", k), tag("dd", v)]) for k, v in facts if v), class_="facts")
     behind = each["table"]
@@ -111,18 +118,8 @@ def _section(each: Mapping[str, Any]) -> Markup:
     )  # fmt: skip
 
 
-def _effort(each: Mapping[str, Any]) -> str:
-    alone = each["group"] == each["row"]
-    shared = "" if alone else f"; what the rows of {each['group']!r} share is in the time of the first that needs it"
-    return f"{each['wall_s']:.1f} s ({each['cpu_s']:.1f} s of processor time), seed {each['seed']}{shared}"
-
-
 def _picture(drawn: Mapping[str, str]) -> Markup:
-    """A drawing as an image, so that nothing in it can act on the page."""
+    """A drawing as an image, so that it cannot act on the page."""
     source = data_uri("image/svg+xml", drawn["svg"].encode("utf-8"))
     image = tag("img", src=source, alt=drawn["title"], class_="paper")
     return figure(drawn["title"], drawn["caption"], image, class_="plot")
-
-
-def _foot() -> Markup:
-    return tag("footer", "Made by skillframe reproduce from the rows' files alone.")

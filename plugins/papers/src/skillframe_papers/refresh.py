@@ -1,8 +1,7 @@
-"""Rows computed again go into the table as committed: `make reproduced`, `python -m skillframe_papers.refresh OUT`.
+"""Update the committed tables: `make reproduced`, `python -m skillframe_papers.refresh OUT`.
 
-OUT is a folder of `skillframe reproduce`. Its rows replace those of the same number that ship with this package, of a
-full or of a quick run, whichever it was; the others stay. A full run also writes the page of the docs. Prints how long
-each row took, and how long all of them take now.
+The rows of OUT, a folder of `skillframe reproduce`, replace those of the same number in the full or quick table, from
+which the docs are built. Prints computing times.
 """
 
 from __future__ import annotations
@@ -15,35 +14,32 @@ from typing import Any
 
 from skillframe.files import write_whole
 from skillframe.files.documents import read_json
-from skillframe_papers import committed, document, store
+from skillframe_papers import committed, store
 from skillframe_papers.jobs import in_order
-
-PAGE = Path("docs") / "explanation" / "reproduced.md"
 
 
 def merged(old: Sequence[Mapping[str, Any]], new: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Rows by number, the new ones in place of the old."""
+    """Rows by number, new ones in place of old."""
     rows = {each["row"]: each for each in (*old, *new)}
     return [rows[name] for name in in_order(list(rows))]
 
 
 def times(new: Sequence[Mapping[str, Any]], rows: Sequence[Mapping[str, Any]]) -> list[str]:
-    """A line for each new row, and one for all: processor time and wall time."""
+    """Processor and wall time, a line for each new row and one for all."""
     each = [f"row {e['row']}: {e['verdict']}, {e['cpu_s']:.0f} s of processor time, {e['wall_s']:.0f} s" for e in new]
     minutes = sum(e["cpu_s"] for e in rows) / 60.0
     return [*each, f"all {len(rows)} rows: {minutes:.1f} minutes of processor time"]
 
 
-def refresh(out: Path, root: Path, folder: Path = committed.FOLDER) -> list[str]:
-    """Put a folder's rows into the table as committed.
+def refresh(out: Path, folder: Path = committed.FOLDER) -> list[str]:
+    """Put a folder's rows into the committed table.
 
     Args:
         out: folder of `skillframe reproduce`.
-        root: of the repository, whose docs are written.
         folder: of the committed tables.
 
     Returns:
-        how long rows took, a line each.
+        times of rows, a line each.
 
     Raises:
         InputError: no table in `out`, or a damaged one.
@@ -57,11 +53,9 @@ def refresh(out: Path, root: Path, folder: Path = committed.FOLDER) -> list[str]
         rows = merged(read_json(folder / name, "install skillframe-papers again"), chosen)
         text = json.dumps(rows, indent=1, sort_keys=True, allow_nan=False, ensure_ascii=False) + "\n"
         write_whole(folder / name, text.encode())
-        if not quick:
-            write_whole(root / PAGE, document.render(rows).encode())
         lines += times(chosen, rows)
     return lines
 
 
 if __name__ == "__main__":
-    print("\n".join(refresh(Path(sys.argv[1]), Path.cwd())))
+    print("\n".join(refresh(Path(sys.argv[1]))))

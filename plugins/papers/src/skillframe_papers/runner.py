@@ -1,7 +1,7 @@
-"""Computes rows in the workers of a campaign's pool, a group each: what fails or is interrupted costs itself only.
+"""Compute rows in a campaign's pool of workers, a group each, whose failures stay separate.
 
-A worker writes a row's file when the row is done, so that whatever ends the run, finished rows are kept, and the next
-run computes what is missing. A row says nothing of how far it is, so no time limit holds.
+A worker writes each finished row to a file, and the next run computes what is missing. Rows report no progress, so
+there is no time limit.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from time import perf_counter
 from typing import Any, Literal, NamedTuple
 
 from skillframe.campaign.cluster import ClusterPool
-from skillframe.campaign.driver import WHY, Answer, Died, Pool, Raised
-from skillframe.campaign.identity import identity
+from skillframe.campaign.driver import WHY, Answer, Died, Pool
+from skillframe.campaign.provenance import identity
 from skillframe.errors import SkillframeError
 from skillframe.extend.records import RowRun
 from skillframe.extend.registry import registry
@@ -28,20 +28,20 @@ from skillframe_papers.jobs import Job
 
 Tell = Callable[[str], None]
 WATCH = "watch"
-"""Folder for the files of the workers that run now, beside the rows."""
+"""Folder of the running workers' files, beside the rows."""
 
 
 class RowFailed(SkillframeError):
-    """Rows that could not be computed, because of what they were given. Says which and why."""
+    """Rows that could not be computed with their settings."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Group:
-    """Rows that one worker computes, one after another.
+    """Rows that one worker computes in sequence.
 
     Attributes:
         jobs: the rows.
-        folder: where they are kept.
+        folder: of their files.
     """
 
     jobs: tuple[Job, ...]
@@ -49,18 +49,18 @@ class Group:
 
     @property
     def size(self) -> int:
-        """How many rows it gives."""
+        """Number of rows."""
         return len(self.jobs)
 
 
 class Outcome(NamedTuple):
-    """What became of the jobs.
+    """Result of the jobs.
 
     Attributes:
         entries: finished rows, in the order of the jobs.
-        refused: sentences about rows that refused their settings, and about workers that could not be had.
+        refused: sentences about rows that refused their settings, and about missing workers.
         broken: sentences about rows that ended in an internal error.
-        interrupted: Ctrl-C came, or SIGTERM in its place, before the end.
+        interrupted: Ctrl-C or SIGTERM came before the end.
     """
 
     entries: list[dict[str, Any]]
@@ -74,10 +74,10 @@ def run(jobs: Sequence[Job], folder: Path, *, workers: int, fresh: bool, tell: T
 
     Args:
         jobs: the rows.
-        folder: where rows are kept; made if absent.
-        workers: how many at a time.
-        fresh: compute those that are there, too.
-        tell: is told what happens.
+        folder: of the rows' files; made if absent.
+        workers: at a time.
+        fresh: compute existing rows, too.
+        tell: called with messages.
     """
     missing = [job for job in jobs if fresh or store.kept(folder, job) is None]
     if len(missing) < len(jobs):
@@ -85,25 +85,21 @@ def run(jobs: Sequence[Job], folder: Path, *, workers: int, fresh: bool, tell: T
     session = _Session(tell=tell)
     interrupted = False
     try:
-        session.work_off(_groups(missing, folder), workers)
+        by_group: dict[str, list[Job]] = {}
+        for job in missing:
+            by_group.setdefault(job.group, []).append(job)
+        session.work_off([Group(jobs=tuple(each), folder=folder.resolve()) for each in by_group.values()], workers)
     except KeyboardInterrupt:
         interrupted = True
-    except SkillframeError as error:  # of the pool: a row's own is caught where it is computed
+    except SkillframeError as error:  # of the pool; a row's own is caught where it is computed
         session.refused.append(str(error))
     found = [entry for job in jobs if (entry := store.kept(folder, job)) is not None]
     return Outcome(found, session.refused, session.broken, interrupted)
 
 
-def _groups(jobs: Sequence[Job], folder: Path) -> list[Group]:
-    found: dict[str, list[Job]] = {}
-    for job in jobs:
-        found.setdefault(job.group, []).append(job)
-    return [Group(jobs=tuple(each), folder=folder.resolve()) for each in found.values()]
-
-
 @dataclass(slots=True, kw_only=True)
 class _Session:
-    """One call's work, and the rows whose end it has not told yet."""
+    """One call's work, and rows whose end is not yet reported."""
 
     tell: Tell
     refused: list[str] = field(default_factory=list)
@@ -112,11 +108,11 @@ class _Session:
     told: set[str] = field(default_factory=set)
 
     def work_off(self, groups: Sequence[Group], workers: int) -> None:
-        """Compute all groups, as many at a time as there are workers.
+        """Compute all groups, one for each worker at a time.
 
         Raises:
             SchedulerError: no workers.
-            KeyboardInterrupt: the workers are ended, and what they had finished is kept.
+            KeyboardInterrupt: the workers are ended; finished rows are kept.
         """
         if not groups:
             return
@@ -126,16 +122,14 @@ class _Session:
             ours=identity(plugins=False), needed=set(), tell=lambda share: self._tell_ends(), note=self.tell,
         )  # fmt: skip
         with closing(pool):
-            self._run(pool, deque(groups))
-
-    def _run(self, pool: Pool[Group], waiting: deque[Group]) -> None:
-        while waiting or self.flying:
-            while waiting and len(self.flying) < pool.size:
-                self._begin(pool, waiting.popleft())
-            group, answer = pool.next()
-            self._tell_ends()
-            self.flying.remove(group)
-            self._note(group, answer)
+            waiting = deque(groups)
+            while waiting or self.flying:
+                while waiting and len(self.flying) < pool.size:
+                    self._begin(pool, waiting.popleft())
+                group, answer = pool.next()
+                self._tell_ends()
+                self.flying.remove(group)
+                self._note(group, answer)
 
     def _begin(self, pool: Pool[Group], group: Group) -> None:
         for job in group.jobs:
@@ -146,7 +140,6 @@ class _Session:
         pool.submit(group)
 
     def _tell_ends(self) -> None:
-        """Say of rows in flight that they are there, once each."""
         for group in self.flying:
             for job in group.jobs:
                 entry = None if job.row in self.told else store.kept(group.folder, job)
@@ -156,28 +149,25 @@ class _Session:
                     self.tell(f"row {job.row}: {entry['verdict']} after {took}: {entry['ours']}")
 
     def _note(self, group: Group, answer: Answer) -> None:
-        """Say of a group's other rows what became of them."""
-        failed = answer if isinstance(answer, list) else [
-            {"row": job.row, "kind": "broken", "text": _end(answer)} for job in group.jobs if job.row not in self.told
-        ]  # fmt: skip
+        failed = answer if isinstance(answer, list) else []
+        if not isinstance(answer, list):
+            text = f"its process {WHY[answer.cause]}" if isinstance(answer, Died) else answer.text
+            lost = [job.row for job in group.jobs if job.row not in self.told]
+            failed = [{"row": row, "kind": "broken", "text": text} for row in lost]
         for each in failed:
             text = f"row {each['row']}: {each['text']}"
             self.tell(text)
             (self.refused if each["kind"] == "refused" else self.broken).append(text)
 
 
-def _end(answer: Died | Raised) -> str:
-    return f"its process {WHY[answer.cause]}" if isinstance(answer, Died) else answer.text
-
-
 def compute(group: Group) -> list[dict[str, Any]]:
-    """Compute rows one after another and keep each. Runs in a worker.
+    """Compute and store rows in a worker.
 
     Returns:
         of each row that could not be computed: `row`, `kind` ("refused" its settings, or "broken") and `text`.
     """
     failed = []
-    with redirect_stdout(sys.stderr):  # whatever a row prints, stdout is the command's
+    with redirect_stdout(sys.stderr):  # a row's prints must not reach the command's stdout
         for job in group.jobs:
             problem = _compute(job, group.folder)
             if problem is not None:
@@ -186,7 +176,7 @@ def compute(group: Group) -> list[dict[str, Any]]:
 
 
 def _processor_time() -> float:
-    """Of this process and of its children that have ended [s]."""
+    """Processor time of this process and its ended children [s]."""
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system
 

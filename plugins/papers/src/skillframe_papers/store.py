@@ -1,6 +1,6 @@
-"""What is kept of computed rows: `rows/<row>.json` for each as soon as it is there, `reproduce.json` with all of them.
+"""Files of computed rows: `rows/<row>.json` for each when done, `reproduce.json` with all.
 
-`reproduce.json` holds a list; its keys are in the contract. Pictures stay in the files of the rows.
+The contract has the keys of `reproduce.json`. Pictures are in the rows' files only.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ ROWS, TABLE, SUM = "rows", "reproduce.json", "sum"
 
 
 def entry(row: RowType, job: Job, result: RowResult, wall_s: float, cpu_s: float) -> dict[str, Any]:
-    """A computed row as plain JSON values, with what it took: wall time and processor time."""
+    """A computed row as JSON values, with wall and processor time."""
     return {
         "row": row.name, "summary": row.summary, "published": row.published, "source": row.source, "bar": row.bar,
         "ours": result.ours, "verdict": verdict(row, result), "difference": result.difference,
@@ -36,7 +36,7 @@ def entry(row: RowType, job: Job, result: RowResult, wall_s: float, cpu_s: float
 
 
 def values_are(row: RowType, result: RowResult) -> str:
-    """Where our figure comes from, in a word."""
+    """Origin of the result, in a word."""
     if not result.computed:
         return "not computed"
     if row.calibrated:
@@ -45,12 +45,12 @@ def values_are(row: RowType, result: RowResult) -> str:
 
 
 def verdict(row: RowType, result: RowResult) -> str:
-    """The verdict that counts: reaching a weak row's threshold is no pass, but missing it is a failure."""
+    """The verdict: a weak row cannot pass, but can fail."""
     return "reported" if row.weak and result.verdict == "pass" else result.verdict
 
 
 def keep(folder: Path, found: Mapping[str, Any]) -> None:
-    """Write one row's file, whole or not at all, with a checksum of what it says."""
+    """Write one row's file atomically, with a checksum."""
     write_whole(path_of(folder, found["row"]), _text({**found, SUM: _sum(found)}))
 
 
@@ -60,7 +60,7 @@ def path_of(folder: Path, row: str) -> Path:
 
 
 def kept(folder: Path, job: Job) -> dict[str, Any] | None:
-    """A row computed earlier by an equal job, or None. A file that is not as `keep` wrote it is none."""
+    """A row computed by an equal job, or None, also where the file is damaged."""
     try:
         found = read_json(path_of(folder, job.row), "compute the row again")
     except InputError:
@@ -77,7 +77,7 @@ def write_table(folder: Path, entries: Sequence[Mapping[str, Any]]) -> None:
 
 
 def table(entries: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """The rows without their pictures and what only the store needs."""
+    """The rows without pictures and the store's own keys."""
     return [{key: value for key, value in each.items() if key not in ("pictures", "key")} for each in entries]
 
 
@@ -86,5 +86,4 @@ def _text(value: Any) -> bytes:
 
 
 def _sum(found: Mapping[str, Any]) -> str:
-    """Of a row as plain values. Damage may have put in what `keep` never writes."""
     return hashlib.sha256(json.dumps(found, sort_keys=True).encode()).hexdigest()[:16]

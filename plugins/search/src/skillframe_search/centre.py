@@ -1,11 +1,10 @@
-r"""Drawing a part that rests at its depth back over the nominal axis, as far as its contacts let it.
+r"""Skill that moves a resting part back to the nominal axis as far as its contacts allow.
 
     x_d = x_0 + u e,    0 <= u <= |a| + F / k,    e = - a / |a|,  a: from the nominal axis to the tool, across the way
 
-A search leaves a part wherever it sank. Walls hold it there, or nothing does: in a slot that is open at an end the
-depth tells nothing of the place along it, and the demonstrated place is the best guess. It presses lightly, where there
-is a bottom, and has done what it can where it arrives, or where more than a stated force F holds it. Friction holds it
-back with less, so that it is wanted up to F / k beyond the axis, k the stiffness across (all ours).
+Depth alone does not give the place across the way (a slot may be open at one end). The skill ends at the axis, or where
+more than the force F holds the part; the target lies up to F / k beyond the axis (k: stiffness across) to overcome
+friction.
 """
 
 from __future__ import annotations
@@ -15,22 +14,22 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.frames import Float, Pose, norm
+from skillframe.frames import Float, Pose, dot, norm
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons, rows_of
 
-SPEED, PRESS_N, ACROSS, TURN = 0.02, 4.0, 4000.0, 3.0  # m/s, N, N/m, Nm/rad: the default search's
+SPEED, ACROSS, TURN = 0.02, 4000.0, 3.0  # m/s, N/m, Nm/rad: the default search's
 SETTLE_S, SMOOTHING_S, THERE_M = 0.1, 0.02, 2e-4
 ROWS = ("_back", "_length", "_began", "_felt", "_status", "_reason")
 
 
 class Centre(Skill):
-    """Draws N tools back to an axis.
+    """Moves N tools back to an axis.
 
     Args:
         ends: (N, 3) a point of the axis in base [m].
-        way: (3,) unit vector along it, the way in.
-        most_n: held with more than this, it ends [N].
-        pressed: against a bottom; else its height is held.
+        way: (3,) unit vector of insertion along the axis.
+        most_n: a contact force above this ends the motion [N].
+        pressed: press against the bottom; otherwise hold the height.
     """
 
     def __init__(self, ends: Float, way: Float, most_n: float, pressed: bool = True) -> None:
@@ -40,11 +39,11 @@ class Centre(Skill):
         self._stiffness[:3, :3], self._stiffness[3:, 3:] = ACROSS * across, TURN * np.eye(3)
 
     def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
-        """Take the way back from where the tools are."""
+        """Plan the way back."""
         position, n = observation.pose.position, len(rngs)
         self._home = Pose(position.copy(), observation.pose.rotation.copy())
         away = self._ends - position
-        away = away - _dot(away, self._way)[:, None] * self._way
+        away = away - dot(away, self._way)[:, None] * self._way
         self._length = norm(away)
         self._back = away / np.maximum(self._length, 1e-9)[:, None]
         self._began, self._felt = observation.time.copy(), np.zeros(n)
@@ -53,7 +52,7 @@ class Centre(Skill):
     def restart(
         self, rows: NDArray[np.intp], observation: Observation, rngs: Sequence[np.random.Generator]
     ) -> None:  # fmt: skip
-        """Start again in some trials, from where their tools are now."""
+        """Start again in the given trials."""
         fresh = Centre(self._ends[rows], self._way, self._most, self._pressed)
         fresh.start(rows_of(observation, rows), rngs)
         for name in ROWS:
@@ -61,7 +60,7 @@ class Centre(Skill):
         self._home.position[rows], self._home.rotation[rows] = fresh._home
 
     def step(self, observation: Observation) -> Command:
-        """Go on back."""
+        """The next command."""
         gone = SPEED * (observation.time - self._began)
         held = -(observation.wrench[:, :3] * self._back).sum(axis=1)
         self._felt += (held - self._felt) * (observation.dt / (SMOOTHING_S + observation.dt))
@@ -69,21 +68,13 @@ class Centre(Skill):
         moved = ((observation.pose.position - self._home.position) * self._back).sum(axis=1)
         done = (self._felt > self._most) | (moved > self._length - THERE_M) | (gone > farthest + SPEED * SETTLE_S)
         for i in np.flatnonzero(done & (self._status == Status.RUNNING)).tolist():
-            self._status[i], self._reason[i] = Status.SUCCESS, self._told(observation, i)
+            drawn = 1e3 * float((observation.pose.position[i] - self._home.position[i]) @ self._back[i])
+            held_words = f", held with {self._felt[i]:.0f} N" if self._felt[i] > self._most else ""
+            self._status[i] = Status.SUCCESS
+            self._reason[i] = f"drawn back by {drawn:.1f} of {1e3 * self._length[i]:.1f} mm{held_words}"
         wrench = np.zeros((len(gone), 6))
-        wrench[:, :3] = PRESS_N * self._pressed * self._way
+        wrench[:, :3] = 4.0 * self._pressed * self._way  # N
         place = self._home.position + np.minimum(gone, farthest)[:, None] * self._back
         pose = Pose(place, self._home.rotation)
         zero = np.zeros((len(gone), 6))
         return Command(pose, zero, Impedance(self._stiffness), wrench, self._status.copy(), self._reason.copy())
-
-    def _told(self, observation: Observation, row: int) -> str:
-        moved = 1e3 * float((observation.pose.position[row] - self._home.position[row]) @ self._back[row])
-        held = f", held with {self._felt[row]:.0f} N" if self._felt[row] > self._most else ""
-        return f"drawn back by {moved:.1f} of {1e3 * self._length[row]:.1f} mm{held}"
-
-
-def _dot(rows: Float, way: Float) -> Float:
-    """(N,) how far rows (N, 3) go along a way (3,), each by itself."""
-    result: Float = rows[:, 0] * way[0] + rows[:, 1] * way[1] + rows[:, 2] * way[2]
-    return result

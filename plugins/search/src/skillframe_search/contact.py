@@ -1,8 +1,7 @@
-r"""What a blind demonstration says: where the tool was in contact, how it moved there, and what it felt.
+r"""Contact, motion and forces of blind demonstrations in a common frame.
 
-All demonstrations are put into one **search frame**, aligned at their starts and not at the goal (seed, section on
-search): x_k <- x_k - x_0 in base axes, or R_0^T (x_k - x_0) in the tool's axes at the start. Samples are means over
-bins of 40 ms (our choice: longer than sensor noise, shorter than a dwell), so that a dwell weighs as long as it lasted.
+The **search frame** is aligned at the starts: x_k - x_0 in base axes, or R_0^T (x_k - x_0) in the tool's axes at the
+start. Samples are means over bins of 40 ms, longer than sensor noise and shorter than a dwell.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from skillframe.errors import InputError
 from skillframe.frames import Float, cross, move_wrench, norm, rotate, rotate_spatial, rotation_vector, unit
 
 BIN_S = 0.04
-FALLEN_M, BEFORE_S = 0.002, 0.2  # deeper than the surface by this is in the hole; cut from this long before
+FALLEN_M, BEFORE_S = 0.002, 0.2  # m below the surface is in the hole, s cut before that
 
 
 class Samples(NamedTuple):
@@ -35,12 +34,12 @@ class Samples(NamedTuple):
     wrench: Float
 
     def rows(self, keep: NDArray[np.bool_]) -> Samples:
-        """Some of the bins."""
+        """The selected bins."""
         return Samples(self.place[keep], self.rate[keep], self.wrench[keep])
 
 
-def samples(demonstration: Demonstration, at: Float, in_start_attitude: bool) -> Samples:
-    """A demonstration in bins, all of it.
+def samples(demonstration: Demonstration, at: Float, in_start_orientation: bool) -> Samples:
+    """All of a demonstration in bins.
 
     Raises:
         InputError: shorter than ten bins.
@@ -49,11 +48,11 @@ def samples(demonstration: Demonstration, at: Float, in_start_attitude: bool) ->
     turned = pose.rotation @ pose.rotation[0].T
     place = np.concatenate([pose.position - pose.position[0], rotation_vector(turned)], axis=1)
     wrench = move_wrench(demonstration.wrench, rotate(demonstration.pose.rotation, at))
-    if in_start_attitude:
+    if in_start_orientation:
         back = np.broadcast_to(pose.rotation[0].T, (len(place), 3, 3))
         place, wrench = rotate_spatial(back, place), rotate_spatial(back, wrench)
     index = ((demonstration.time - demonstration.time[0]) / BIN_S).astype(int)
-    count = int(index[-1])  # the last bin is not full
+    count = int(index[-1])
     if count < 10:
         raise InputError(
             demonstration.source or "demonstration", "is too short to learn a search from", "record longer"
@@ -63,7 +62,6 @@ def samples(demonstration: Demonstration, at: Float, in_start_attitude: bool) ->
 
 
 def _means(values: Float, index: NDArray[np.int64], count: int) -> Float:
-    """Means per bin. A bin without a sample (a gap) takes its neighbours' line."""
     keep = index < count
     number = np.bincount(index[keep], minlength=count)
     total = np.stack([np.bincount(index[keep], column[keep], count) for column in values.T], axis=1)
@@ -73,12 +71,10 @@ def _means(values: Float, index: NDArray[np.int64], count: int) -> Float:
 
 
 def push_direction(demonstrations: Sequence[Samples], least: float) -> Float:
-    """(3,) unit vector along which the person pushed: against the mean force wherever one was felt.
-
-    Friction points against the motion, all ways in a search, and averages out.
+    """(3,) unit vector of the teacher's push, opposite to the mean contact force, in which friction averages out.
 
     Raises:
-        InputError: no force above `least` [N] anywhere: the surface was never touched.
+        InputError: no force above `least` [N].
     """
     forces = np.concatenate([s.wrench[:, :3] for s in demonstrations])
     felt = forces[norm(forces) > least]
@@ -92,7 +88,7 @@ def push_direction(demonstrations: Sequence[Samples], least: float) -> Float:
 
 
 def in_contact(found: Samples, push: Float, least: float) -> Samples:
-    """The bins pressed against the surface, up to shortly before the tool fell in, if it did."""
+    """Bins in contact, up to shortly before the tool falls in."""
     pressed = -(found.wrench[:, :3] @ push) > least
     depth = found.place[:, :3] @ push
     if pressed.any():

@@ -1,4 +1,4 @@
-"""A search in words."""
+"""Description of a search in words."""
 
 from __future__ import annotations
 
@@ -20,13 +20,18 @@ NAMES = {
 
 
 def describe(document: Document) -> list[str]:
-    """The search of a document, a line each."""
+    """The lines that describe a document's search."""
     phase = read_phase(document)
     x, y, z = phase.push.direction
+    path = phase.path
+    way = WAYS[path.kind].format(pitch=1e3 * path.pitch, step=1e3 * path.step)
+    bounds = f"at most {1e3 * path.speed:.3g} mm/s and {path.acceleration:.3g} m/s²"
+    if path.kind == "spiral" and path.radius:
+        way += f" and {1e3 * path.radius:.1f} mm wide, {path.passes} passes"
     return [
         f"press along ({x:.3f}, {y:.3f}, {z:.3f}) with {phase.push.force:.1f} N",
         *_where(phase),
-        _way(phase),
+        f"follow {way}, {bounds}, stiffness {phase.stiffness.translation:g} N/m across the push and none along it",
         *_held(phase),
         _forces(phase),
         f"done when {1e3 * phase.stop.drop_m:.3g} mm deeper than the surface and the answer to the push was lost; "
@@ -47,15 +52,6 @@ def _where(phase: Phase) -> list[str]:
     return lines
 
 
-def _way(phase: Phase) -> str:
-    path = phase.path
-    way = WAYS[path.kind].format(pitch=1e3 * path.pitch, step=1e3 * path.step)
-    bounds = f"at most {1e3 * path.speed:.3g} mm/s and {path.acceleration:.3g} m/s²"
-    if path.kind == "spiral" and path.radius:
-        way += f" and {1e3 * path.radius:.1f} mm wide, {path.passes} passes"
-    return f"follow {way}, {bounds}, stiffness {phase.stiffness.translation:g} N/m across the push and none along it"
-
-
 def _held(phase: Phase) -> list[str]:
     seen = phase.evidence
     if "friction" not in seen or phase.forces is not None:
@@ -70,4 +66,4 @@ def _held(phase: Phase) -> list[str]:
 def _forces(phase: Phase) -> str:
     if phase.forces is None:
         return "press and exert nothing more"
-    return f"exert the forces that were felt at the same velocity ({len(phase.forces.weights)} components)"
+    return f"exert the forces demonstrated at the same velocity ({len(phase.forces.weights)} components)"

@@ -1,13 +1,12 @@
-r"""A search trajectory by ergodic control: the time spent anywhere follows the exploration distribution.
+r"""Search trajectory by ergodic control: the time spent at a place follows the exploration distribution.
 
 Spectral multiscale coverage (Mathew and Mezic, Physica D 240 (2011) 432-442), first-order dynamics:
 
     c_k(t) = 1/t int_0^t f_k(x(s)) ds,   b = sum_k L_k (c_k - phi_k) grad f_k(x),   x' = -v b / |b|,
     L_k = (1 + |k|^2)^(-(d+1)/2),   f_k = prod_i cos(k_i pi (x_i + R_i) / 2 R_i) / h_k
 
-on a box of R_i = 3.2 standard deviations along the principal axes of the Gaussian, whose coefficients are known in
-closed form: E[cos(k pi (x + R) / 2 R)] = cos(k pi / 2) exp(-(k pi s / 2 R)^2 / 2). Deterministic: the same trajectory
-every time. The number of basis functions (10 per axis in the plane, 7 in three dimensions) and the box are our choice.
+on a box of R_i = 3.2 standard deviations along the Gaussian's axes, with E[cos(k pi (x + R) / 2 R)] = cos(k pi / 2)
+exp(-(k pi s / 2 R)^2 / 2).
 """
 
 from __future__ import annotations
@@ -25,13 +24,13 @@ ORDERS = {1: 20, 2: 10, 3: 7, 4: 4, 5: 3}  # basis functions per axis
 
 
 def ergodic(exploration: Exploration, speed: float, duration: float) -> Float:
-    """(n, k) places every 20 ms [m], from the start (zero) on, at a constant speed [m/s]."""
+    """(n, k) places every 20 ms [m], from the start (zero), at a constant speed [m/s]."""
     variance, axes = np.linalg.eigh(exploration.spread)
     half = REACH * np.sqrt(variance)
     basis = _Basis(half, ORDERS[len(half)])
     target = basis.of_normal(np.sqrt(variance))
     here = np.clip((np.zeros(len(half)) - exploration.center) @ axes, -half, half)
-    here = here + 1e-3 * half * np.arange(1, len(half) + 1)  # the very middle has no slope to follow
+    here = here + 1e-3 * half * np.arange(1, len(half) + 1)  # the gradient vanishes at the middle
     total, path = np.zeros_like(target), [here]
     for tick in range(1, round(duration / STEP_S) + 1):
         value, slope = basis.at(here)
@@ -46,11 +45,7 @@ def ergodic(exploration: Exploration, speed: float, duration: float) -> Float:
 
 
 class _Basis:
-    """Cosines on the box [-half, half]. Rows are the basis functions.
-
-    Attributes:
-        importance: (n,) L_k.
-    """
+    """Cosines on the box [-half, half], with (n,) importance L_k."""
 
     def __init__(self, half: Float, order: int) -> None:
         self._half = half
@@ -72,7 +67,7 @@ class _Basis:
         return value, slope
 
     def of_normal(self, deviation: Float) -> Float:
-        """(n,) coefficients of a centred normal density with these standard deviations along the axes."""
+        """(n,) coefficients of a centred normal density with these standard deviations."""
         one = np.cos(0.5 * np.pi * self._index) * np.exp(-0.5 * (self._frequency * deviation) ** 2)
         result: Float = one.prod(axis=1) / self._h
         return result

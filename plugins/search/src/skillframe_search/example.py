@@ -1,4 +1,4 @@
-"""A small valid document of each kind, to try the types with."""
+"""Small valid example documents."""
 
 from __future__ import annotations
 
@@ -12,22 +12,19 @@ RATE, SECONDS = 100.0, 20.0
 PUSH, FRICTION = 10.0, 0.2
 
 
-def example(kind: str) -> Document:
-    """A document of a kind, learned from a made-up search of a plane."""
-    from skillframe.document.source import learned
+def example(algorithm: str = "sampling") -> Document:
+    """A search document of an algorithm, learned from a synthetic search of a plane."""
+    from skillframe.document.file import learned
     from skillframe.extend.registry import registry
 
-    settings = {"speed": 0.015, "time": 4.0}
-    return learned(registry().skill(kind), [searching()], LearnOptions(settings=settings))
+    settings = {"algorithm": algorithm, "speed": 0.015, "time": 4.0}
+    return learned(registry().skill("search"), [searching()], LearnOptions(settings=settings))
 
 
 def searching(
     seed: int = 3, deviation: tuple[float, float] = (0.004, 0.004), friction: float = FRICTION
 ) -> Demonstration:
-    """Twenty seconds of an Ornstein-Uhlenbeck search of a plane with Coulomb friction, without noise of sensors.
-
-    It is there to exercise the learner; what it is judged by are searches of the simulated world.
-    """
+    """20 s of an Ornstein-Uhlenbeck search of a plane with Coulomb friction and no sensor noise."""
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, SECONDS, 1.0 / RATE)
     position = np.zeros((len(time), 3))
@@ -44,20 +41,20 @@ def searching(
 
 
 def seating() -> Document:
-    """A seating, learned from two made-up demonstrations of a plug."""
-    from skillframe.document.source import learned
+    """A seating learned from two synthetic demonstrations of a plug."""
+    from skillframe.document.file import learned
     from skillframe.extend.registry import registry
 
     return learned(registry().skill("seat"), [seated(0.14), seated(-0.14, 1)], LearnOptions())
 
 
 def seated(tilt: float, seed: int = 0) -> Demonstration:
-    """10 mm down in free air, tilted about y [rad], then 12 mm in contact, upright at the end, tip at (0.4, 0, 0.2)."""
+    """10 mm down in air, tilted about y [rad], then 12 mm in contact, upright at the end, tip at (0.4, 0, 0.2)."""
     time = np.arange(0.0, 3.0, 1.0 / (2.0 * RATE))
     down = np.interp(time, [0.0, 0.5, 1.5, 3.0], [0.0, 0.0, 0.010, 0.022])
     angle = np.interp(time, [0.0, 1.5, 2.7], [tilt, tilt, 0.0])
     tip = np.array([0.4, 0.0, 0.222]) - down[:, None] * np.array([0.0, 0.0, 1.0])
-    axis = np.stack([-np.sin(angle), 0.0 * angle, -np.cos(angle)], axis=1)  # of a tool that points down
+    axis = np.stack([-np.sin(angle), 0.0 * angle, -np.cos(angle)], axis=1)
     noise = np.random.default_rng(seed).standard_normal((len(time), 6)) * np.repeat([0.05, 0.002], 3)
     noise[:, 2] += np.where(time > 1.5, PUSH, 0.0)
     half = 0.5 * angle
@@ -69,7 +66,7 @@ def seated(tilt: float, seed: int = 0) -> Demonstration:
 
 
 def _wander(rng: np.random.Generator, count: int) -> Float:
-    """(count, 2) a smooth wandering of unit variance: two Ornstein-Uhlenbeck filters of 0.5 s, one after the other."""
+    """(count, 2) random motion of unit variance: two Ornstein-Uhlenbeck filters of 0.5 s in series."""
     values, state, inner = np.empty((count, 2)), np.zeros(2), np.zeros(2)
     decay = 1.0 / (0.5 * RATE)
     for k in range(count):

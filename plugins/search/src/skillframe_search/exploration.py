@@ -1,9 +1,8 @@
-r"""The exploration distribution: one Gaussian over where the blindfolded person looked (seed; [5]).
+r"""Exploration distribution: one Gaussian over the places that the blindfolded teacher searched ([5]).
 
-Coordinates, of the tool against where it started: two displacements along the surface, tilts about these two axes, and
-the turn about the normal. Those that hardly varied (0.5 mm, 1 degree; ours) are not searched, which tells a planar
-search from one in three dimensions. Distances mix metres and radians through a lever of 23 mm (ours: where about
-1 mm and 2.5 degrees are missed alike).
+Coordinates of the tool against its start: two displacements along the surface, tilts about these axes, and the turn
+about the normal. Those that varied less than 0.5 mm or 1 degree are not searched. The lever of 23 mm makes 1 mm as
+large as 2.5 degrees, about equal misses.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from skillframe_search.contact import Samples
 COORDINATES = ("across_1", "across_2", "tilt_1", "tilt_2", "turn")
 LEVER = 0.023  # m per rad
 LEAST_M, LEAST_RAD = 5e-4, radians(1.0)
-CUT = 3.5  # standard deviations: nothing is looked for farther out
+CUT = 3.5  # standard deviations: the limit of the search
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -39,7 +38,7 @@ class Exploration:
 
     @property
     def columns(self) -> list[int]:
-        """Which of `COORDINATES` are searched."""
+        """Indices of the searched `COORDINATES`."""
         return [COORDINATES.index(name) for name in self.coordinates]
 
     @property
@@ -49,16 +48,16 @@ class Exploration:
 
     @property
     def center(self) -> Float:
-        """(k,) the mean in metres, angles through the lever."""
+        """(k,) mean in metres, angles through the lever."""
         return np.array(self.mean) * self.scale
 
     @property
     def spread(self) -> Float:
-        """(k, k) the covariance in square metres, alike."""
+        """(k, k) covariance in square metres, angles through the lever."""
         return np.array(self.covariance) * np.outer(self.scale, self.scale)
 
     def draw(self, rng: np.random.Generator, count: int, cut: float = CUT) -> Float:
-        """(count, k) samples [m], none farther out than `cut` standard deviations."""
+        """(count, k) samples [m] within `cut` standard deviations."""
         kept = np.zeros((0, len(self.mean)))
         while len(kept) < count:
             more = rng.standard_normal((2 * count + 16, len(self.mean)))
@@ -67,7 +66,7 @@ class Exploration:
 
 
 def coordinates_of(place: Float, axes: Float) -> Float:
-    """(n, 5) the coordinates of displacements and rotation vectors (n, 6), or of their rates."""
+    """(n, 5) coordinates of displacements and rotation vectors (n, 6), or of their rates."""
     return np.concatenate([place[:, :3] @ axes[:2].T, place[:, 3:] @ axes.T], axis=1)
 
 

@@ -1,12 +1,11 @@
-r"""The force model: what wrench is felt while moving with some velocity, wherever that is.
+r"""Force model: the wrench expected at a velocity.
 
-A Gaussian mixture over (rates of the searched coordinates, wrench), without position and hence state-invariant ([5]
-calls its model that; its class was not published, the mixture is our choice). Gaussian mixture regression gives
+A Gaussian mixture over (rates of the searched coordinates, wrench), without position and hence state-invariant ([5],
+whose model class is unpublished). Regression gives
 
     E[w | v] = sum_k h_k(v) (m_w,k + S_wv,k S_vv,k^-1 (v - m_v,k)),   h_k ~ pi_k N(v; m_v,k, S_vv,k)
 
-The number of components is the best of 1 to 8 by BIC on samples of 25 Hz. More always look better to it, because the
-samples of one sliding motion are alike, hence the limit (ours).
+BIC chooses 1 to 8 components on samples of 25 Hz; the limit is needed because samples of one motion are correlated.
 """
 
 from __future__ import annotations
@@ -17,8 +16,7 @@ import numpy as np
 
 from skillframe.frames import Float
 
-MOST_COMPONENTS, ITERATIONS = 8, 60
-FLOOR = 1e-3  # of each standardised variance, so that no component collapses
+FLOOR = 1e-3  # of each standardised variance, against collapse
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +32,7 @@ class ForceModel:
     covariances: tuple[tuple[tuple[float, ...], ...], ...]
 
     def wrench(self, rate: Float) -> Float:
-        """(n, 6) the wrench of the environment expected at rates (n, k)."""
+        """(n, 6) wrench of the environment expected at rates (n, k)."""
         k = rate.shape[1]
         means, covariances = np.array(self.means), np.array(self.covariances)
         share = np.log(np.array(self.weights)) + _log_density(rate, means[:, :k], covariances[:, :k, :k])
@@ -48,11 +46,11 @@ class ForceModel:
 
 
 def fit(rate: Float, wrench: Float, seed: int = 0) -> tuple[ForceModel, list[float]]:
-    """The model of rates (n, k) and wrenches (n, 6), and the criterion per number of components (lower is better)."""
+    """The model of rates (n, k) and wrenches (n, 6), and BIC by number of components (lower is better)."""
     data = np.concatenate([rate, wrench], axis=1)
     middle, scale = data.mean(axis=0), np.maximum(data.std(axis=0), 1e-9)
     rng = np.random.default_rng(seed)
-    most = min(MOST_COMPONENTS, max(len(data) // 50, 1))
+    most = min(8, max(len(data) // 50, 1))
     fits = [_expectation_maximisation((data - middle) / scale, count, rng) for count in range(1, most + 1)]
     criterion = [_bic(log_likelihood, len(data), data.shape[1], len(w)) for w, _, _, log_likelihood in fits]
     weights, means, covariances, _ = fits[int(np.argmin(criterion))]
@@ -70,7 +68,6 @@ def _bic(log_likelihood: float, samples: int, dimensions: int, components: int) 
 
 
 def _log_density(values: Float, means: Float, covariances: Float) -> Float:
-    """(n, K) log of the normal densities."""
     factor = np.linalg.cholesky(covariances)
     away = values[:, None] - means  # (n, K, d)
     white = np.linalg.solve(factor, np.moveaxis(away, 0, -1))  # (K, d, n)
@@ -82,12 +79,11 @@ def _log_density(values: Float, means: Float, covariances: Float) -> Float:
 def _expectation_maximisation(
     data: Float, components: int, rng: np.random.Generator
 ) -> tuple[Float, Float, Float, float]:
-    """Weights, means, covariances and log-likelihood of a mixture. It starts from samples far from each other."""
     n, d = data.shape
     means = _far_apart(data, components, rng)
     weights, covariances = np.full(components, 1.0 / components), np.tile(np.eye(d), (components, 1, 1))
     likelihood = -np.inf
-    for _ in range(ITERATIONS):
+    for _ in range(60):
         joint = np.log(weights) + _log_density(data, means, covariances)
         highest = joint.max(axis=1, keepdims=True)
         total = highest[:, 0] + np.log(np.exp(joint - highest).sum(axis=1))
@@ -104,7 +100,7 @@ def _expectation_maximisation(
 
 
 def _far_apart(data: Float, count: int, rng: np.random.Generator) -> Float:
-    """(count, d) samples, each drawn with the square of its distance to those before (k-means++)."""
+    """(count, d) samples chosen by k-means++."""
     chosen = [data[rng.integers(len(data))]]
     while len(chosen) < count:
         distance = ((data[:, None] - np.array(chosen)) ** 2).sum(axis=2).min(axis=1)

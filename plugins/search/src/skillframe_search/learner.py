@@ -1,4 +1,4 @@
-"""A search document from blind demonstrations: which way to press, where to look, what is felt on the way."""
+"""Learn a search document from blind demonstrations."""
 
 from __future__ import annotations
 
@@ -17,33 +17,32 @@ from skillframe.frames import Float, norm
 from skillframe_search import forces
 from skillframe_search.contact import Samples, in_contact, push_direction, samples, surface_axes
 from skillframe_search.deadband import Gains, dead_band, freed, friction_of
-from skillframe_search.exploration import Exploration, coordinates_of, explored
-from skillframe_search.phase import Kind, Path, Phase, Push, Stiffness, Stop
+from skillframe_search.exploration import coordinates_of, explored
+from skillframe_search.phase import Path, Phase, Push, Stiffness, Stop
 
-SLOWEST, FASTEST = 0.005, 0.02  # what a demonstrated speed is held to [m/s]
 MOVING = 0.002  # m/s: slower is a dwell
-KEPT = 300  # places in the evidence, for the picture
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings:
-    """What can be set for learning. None leaves it to the demonstrations.
+    """Settings for learning, where None takes the demonstrated value.
 
     Attributes:
-        algorithm: "sampling" or "ergodic", the two published; a baseline has its own.
-        feedforward: exert the learned forces; "constant" presses and no more.
+        algorithm: "sampling" or "ergodic" explore where the demonstrations did; "spiral" and "random_walk" around the
+            start, for comparison, and only press.
+        feedforward: "learned" exerts the learned forces; "constant" only presses.
         speed, push: [m/s], [N].
         acceleration: [m/s^2].
-        contact_n: pressed harder than this is in contact [N].
+        contact_n: a larger push is contact [N].
         stiffness, turn_stiffness: across the push [N/m], of rotation [Nm/rad].
         pitch, layers: of the spiral [m], number of turns of it.
-        friction: between tool and surface; None measures it. A spiral that it would hold back by more than its pitch is
-            made stiffer and lighter than demonstrated; 0 leaves push and stiffness as they are.
+        friction: between tool and surface; None measures it. A spiral that lags by more than its pitch becomes stiffer
+            and lighter; 0 keeps push and stiffness.
         step, reach: of the random walk [m].
         time, drop: [s], [m]: `Stop`'s.
     """
 
-    algorithm: Literal["sampling", "ergodic"] = "sampling"
+    algorithm: Literal["sampling", "ergodic", "spiral", "random_walk"] = "sampling"
     feedforward: Literal["learned", "constant"] = "learned"
     speed: float | None = None
     push: float | None = None
@@ -60,8 +59,8 @@ class Settings:
     drop: float = 0.003
 
 
-def learn(demonstrations: Sequence[Demonstration], options: LearnOptions, kind: str = "search") -> Document:
-    """The body of a search document. `kind` is "search", "spiral" or "random_walk".
+def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
+    """Body of a search document.
 
     Raises:
         InputError: no demonstration, one that never touches a surface or searches nothing, or an unknown setting.
@@ -82,42 +81,39 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions, kind: 
     across = norm(coordinates_of(pooled.rate, axes)[:, :2])
     friction = friction_of(pooled, push) if settings.friction is None else settings.friction
     asked = Gains(float(felt.mean()) if settings.push is None else settings.push, settings.stiffness)
-    gains = freed(friction or 0.0, asked, settings.pitch) if kind == "spiral" else asked
-    baseline, looked = kind != "search", coordinates_of(pooled.place, axes)[:, found.columns]
+    gains = freed(friction or 0.0, asked, settings.pitch) if settings.algorithm == "spiral" else asked
+    baseline = settings.algorithm in ("spiral", "random_walk")
+    looked = coordinates_of(pooled.place, axes)[:, found.columns]
+    moving = across[across > MOVING]
+    speed = settings.speed
+    if speed is None:
+        slowest, fastest = 0.005, 0.02  # bounds of a demonstrated speed [m/s]
+        speed = float(np.clip(np.median(moving) if len(moving) else slowest, slowest, fastest))
+    if settings.layers < 1 or (settings.layers > 1 and found.coordinates[-1] != "turn"):
+        raise InputError("--set layers", f"{settings.layers} layers need a search that turns", "give 1")
+    # the spiral's layers: 0, then turns to both sides within 3/4 standard deviation
+    widest = 0.75 * float(np.sqrt(found.covariance[-1][-1])) if settings.layers > 1 else 0.0
+    turns = np.linspace(-widest, widest, settings.layers) if settings.layers > 1 else np.zeros(1)
     phase = Phase(
         push=Push(direction=_vector(push), force=gains.push),
         searched=found.coordinates,
         exploration=None if baseline else found,
         forces=None if baseline or settings.feedforward == "constant" else model,
-        path=_path(kind, settings, found, across),
+        path=Path(
+            kind="tour" if settings.algorithm == "sampling" else settings.algorithm,
+            speed=speed,
+            acceleration=settings.acceleration,
+            pitch=settings.pitch,
+            layers=tuple(float(t) for t in sorted(turns, key=abs)),
+            step=settings.step,
+            reach=settings.reach,
+        ),
         stiffness=Stiffness(translation=gains.stiffness, rotation=settings.turn_stiffness),
         stop=Stop(time_s=settings.time, drop_m=settings.drop),
         evidence={**_evidence(every, parts, push, across, criterion, looked), **_held(friction, asked, gains)},
     )
     body = {"frame": frame, "phases": [plain(asdict(phase))], "settings": asdict(settings)}
     return body
-
-
-def _path(kind: str, settings: Settings, found: Exploration, across: Float) -> Path:
-    learned: Kind = "ergodic" if settings.algorithm == "ergodic" else "tour"
-    baselines: dict[str, Kind] = {"spiral": "spiral", "random_walk": "random_walk"}
-    moving = across[across > MOVING]
-    speed = settings.speed
-    if speed is None:
-        speed = float(np.clip(np.median(moving) if len(moving) else SLOWEST, SLOWEST, FASTEST))
-    return Path(
-        kind=baselines.get(kind, learned), speed=speed, acceleration=settings.acceleration, pitch=settings.pitch,
-        layers=_layers(settings.layers, found), step=settings.step, reach=settings.reach,
-    )  # fmt: skip
-
-
-def _layers(count: int, found: Exploration) -> tuple[float, ...]:
-    """Turns of the spiral's layers: 0, then outwards to both sides within three quarters of a standard deviation."""
-    if count < 1 or (count > 1 and found.coordinates[-1] != "turn"):
-        raise InputError("--set layers", f"{count} layers need a search that turns", "give 1")
-    widest = 0.75 * float(np.sqrt(found.covariance[-1][-1])) if count > 1 else 0.0
-    turns = np.linspace(-widest, widest, count) if count > 1 else np.zeros(1)
-    return tuple(float(t) for t in sorted(turns, key=abs))
 
 
 def _evidence(
@@ -135,12 +131,12 @@ def _evidence(
         "push_n": [float(felt.mean()), float(felt.std())],
         "dwelling_share": float((across < MOVING).mean()),
         "criterion": criterion,
-        "places": np.round(looked[:: len(looked) // KEPT + 1], 5).tolist(),
+        "places": np.round(looked[:: len(looked) // 300 + 1], 5).tolist(),  # places for the picture
     }
 
 
 def _held(friction: float | None, asked: Gains, gains: Gains) -> dict[str, Any]:
-    """What friction does to a compliant search, and from which push and stiffness a spiral was freed."""
+    """Effect of friction, and the gains before `freed`."""
     if friction is None:
         return {}
     said = {"friction": friction, "dead_band_m": dead_band(friction, gains)}
@@ -153,7 +149,7 @@ def _vector(values: Float) -> tuple[float, float, float]:
 
 
 def plain(value: Any) -> Any:
-    """The value with lists for tuples, as it comes back from a file."""
+    """The value with lists for tuples, as read from a file."""
     if isinstance(value, dict):
         return {key: plain(item) for key, item in value.items()}
     return [plain(item) for item in value] if isinstance(value, tuple | list) else value

@@ -1,4 +1,4 @@
-"""The one phase of a search document as checked records. What is wrong is named by its key."""
+"""The phase of a search document as checked records."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Push:
-    """Which way to press [unit vector] and how hard [N]."""
+    """Direction [unit vector] and force [N]."""
 
     direction: Vector
     force: float
@@ -27,16 +27,16 @@ class Push:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Path:
-    """Where to go: the kind of trajectory, its limits and the figures of the baselines.
+    """Trajectory, its limits and the baselines' constants.
 
     Attributes:
         kind: "tour" (samples), "ergodic", "spiral" or "random_walk".
         speed: limit [m/s]; acceleration: limit [m/s^2].
-        pitch: of the spiral [m]; layers: its turns about the normal [rad], one spiral each.
+        pitch: of the spiral [m]; layers: its turns about the normal [rad].
         step, reach: of the random walk [m].
-        radius: at which the spiral turns back [m]; 0 goes on outwards until time is up.
-        passes: of a spiral with a radius: each further one goes the other way, finer and slower.
-        inner: radius within which it goes out and in again before that, because the hole is likelier there [m].
+        radius: at which the spiral turns back [m]; 0: never.
+        passes: of a spiral with a radius, alternating, each finer and slower.
+        inner: radius that is searched first, as the hole is likelier there [m].
     """
 
     kind: Kind
@@ -53,7 +53,7 @@ class Path:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stiffness:
-    """Across the push [N/m], and of rotation [Nm/rad]. Along the push there is none while searching.
+    """Stiffness across the push [N/m] and of rotation [Nm/rad].
 
     Attributes:
         turn: about the push [Nm/rad]; None: as of rotation.
@@ -66,7 +66,7 @@ class Stiffness:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Dither:
-    """Torques that go round while searching, so that the tool rocks: over the push's axis, and about it.
+    """Rotating torques that rock the tool while it searches.
 
     Attributes:
         tilt_nm, tilt_hz: size and frequency of a torque that turns in the surface.
@@ -81,13 +81,13 @@ class Dither:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Stop:
-    """When the search begins and ends. All of it is ours.
+    """Conditions for start and end.
 
     Attributes:
-        touch_n: the surface is touched when the push is answered by this much,
+        touch_n: reaction to the push at which the surface is touched,
         approach_speed: approached at this speed [m/s]; approach_m: over at most this way.
-        drop_m: it has fallen in when it is this much deeper than the surface, and
-        lost_share: the answer to the push had fallen below this share of it on the way there.
+        drop_m: depth below the surface of a part that has fallen in, if
+        lost_share: the reaction fell below this share of the push on the way.
         time_s: of searching, after the touch.
         force_limit_n: a contact force above it fails the trial.
     """
@@ -106,13 +106,13 @@ class Phase:
     """A search.
 
     Attributes:
-        push: how to press.
-        exploration: where to look; None for the baselines, which look around the start.
-        forces: what is felt; None presses and no more.
-        path, stiffness, stop: how to go there, how stiffly, until when.
+        push: direction and force.
+        exploration: where to search; None: around the start.
+        forces: force model; None: presses only.
+        path, stiffness, stop: trajectory, stiffness and end.
         dither: torques on the way.
-        searched: names of the coordinates that the path moves.
-        evidence: what it was learned from.
+        searched: coordinates that the path moves.
+        evidence: data that it was learned from.
     """
 
     name: str = "search"
@@ -131,18 +131,12 @@ def read_phase(document: Document) -> Phase:
     """The phase of a search document.
 
     Raises:
-        InputError: not exactly one phase, or a key that is missing, unknown or holds the wrong thing.
+        InputError: not exactly one phase, or a wrong key or value.
     """
     phases = document["phases"]
     if len(phases) != 1:
         raise InputError("phases", f"a search has one phase, this has {len(phases)}", "learn the skill again")
     phase = build(Phase, phases[0], "phases[0]")
-    _check_numbers(phase)
-    _check_exploration(phase)
-    return phase
-
-
-def _check_numbers(phase: Phase) -> None:
     if abs(float(np.linalg.norm(phase.push.direction)) - 1.0) > 0.01:
         raise InputError("phases[0].push.direction", "should be a unit vector", "divide it by its length")
     positive = {
@@ -166,6 +160,8 @@ def _check_numbers(phase: Phase) -> None:
         raise InputError("phases[0].stop.time_s", "a search longer than 300 s is not planned", "give a shorter time")
     if phase.path.reach < phase.path.step:
         raise InputError("phases[0].path.reach", "is smaller than a step", "give a larger reach")
+    _check_exploration(phase)
+    return phase
 
 
 def _check_exploration(phase: Phase) -> None:
@@ -188,7 +184,6 @@ def _check_exploration(phase: Phase) -> None:
 
 
 def _shape(rows: Any) -> tuple[int, ...]:
-    """The shape of nested rows, (-1,) where they are of different length."""
     try:
         return np.shape(rows)
     except ValueError:
@@ -196,7 +191,6 @@ def _shape(rows: Any) -> tuple[int, ...]:
 
 
 def _fits(forces: ForceModel, k: int) -> bool:
-    """Whether a force model is a mixture of Gaussians over k rates and a wrench."""
     count, width = len(forces.weights), k + 6
     shapes = _shape(forces.means), _shape(forces.covariances)
     if count == 0 or shapes != ((count, width), (count, width, width)) or min(forces.weights) < 0.0:

@@ -1,4 +1,4 @@
-"""Pictures of a search, drawn from its file alone: where the person looked and where it will go (seed, Fig. 16)."""
+"""Pictures of a search document."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
 from skillframe.extend.records import Document, Illustration
-from skillframe.frames import Float, norm
+from skillframe.frames import norm
 from skillframe_search.contact import surface_axes
 from skillframe_search.describe import NAMES
 from skillframe_search.exploration import COORDINATES
@@ -25,13 +25,8 @@ STYLE = {"font.family": "DejaVu Sans", "font.size": 10, "svg.fonttype": "none", 
 
 
 def explain(document: Document) -> list[Illustration]:
-    """The exploration distribution with a trajectory, and the forces of the model."""
+    """The exploration distribution with a trajectory, and the force model."""
     phase = read_phase(document)
-    found = [_where(phase)]
-    return found if phase.forces is None else [*found, _forces(phase)]
-
-
-def _where(phase: Phase) -> Illustration:
     trajectory = plan(keyed(phase), 0)
     turning = "turn" in phase.searched
     figure = Figure(figsize=(9.6 if turning else 5.6, 4.8))
@@ -40,22 +35,26 @@ def _where(phase: Phase) -> Illustration:
     if turning:
         _panel(panels[1], phase, trajectory, 0, len(phase.searched) - 1)
     caption = (
-        f"Grey: where the blindfolded person had the tool, against where it started. Ellipses: one and {FAR:g} "
+        f"Grey: the tool of the blindfolded teacher, relative to its start. Ellipses: one and {FAR:g} "
         f"standard deviations of the Gaussian fitted to it. Blue: one search, {1e3 * trajectory.length:.0f} mm in "
         f"{phase.stop.time_s:g} s."
     )
     if phase.exploration is None:
         caption = f"Blue: one search around the start, {1e3 * trajectory.length:.0f} mm in {phase.stop.time_s:g} s."
-    return Illustration("Where it looks", caption, _svg(figure))
+    found = [Illustration("Where it searches", caption, _svg(figure))]
+    return found if phase.forces is None else [*found, _forces(phase)]
 
 
 def _panel(canvas: Axes, phase: Phase, trajectory: Plan, first: int, second: int) -> None:
-    """Two of the searched coordinates against each other, in mm and degrees."""
     pair = [first, min(second, len(phase.searched) - 1)]
     factor = np.array([degrees(1.0) if _turns(phase, i) else 1e3 for i in pair])
     places = np.array(phase.evidence.get("places", [])).reshape(-1, len(phase.searched))
     canvas.plot(*(places[:, pair] * factor).T, ".", color=GREY, ms=3)
-    canvas.plot(*(_coordinates(phase, trajectory)[:, pair] * factor).T, color=BLUE, lw=0.9)
+    axes = surface_axes(np.array(phase.push.direction))
+    all_five = np.concatenate([trajectory.place[:, :3] @ axes[:2].T, trajectory.place[:, 3:] @ axes.T], axis=1)
+    canvas.plot(
+        *(all_five[:, [COORDINATES.index(name) for name in phase.searched]][:, pair] * factor).T, color=BLUE, lw=0.9
+    )
     if phase.exploration is not None and pair[0] != pair[1]:
         covariance = np.array(phase.exploration.covariance)[np.ix_(pair, pair)] * np.outer(factor, factor)
         mean = np.array(phase.exploration.mean)[pair] * factor
@@ -75,14 +74,7 @@ def _turns(phase: Phase, i: int) -> bool:
     return COORDINATES.index(phase.searched[i]) >= 2
 
 
-def _coordinates(phase: Phase, trajectory: Plan) -> Float:
-    axes = surface_axes(np.array(phase.push.direction))
-    all_five = np.concatenate([trajectory.place[:, :3] @ axes[:2].T, trajectory.place[:, 3:] @ axes.T], axis=1)
-    return all_five[:, [COORDINATES.index(name) for name in phase.searched]]
-
-
 def _forces(phase: Phase) -> Illustration:
-    """Force along the motion over speed, for motion all ways along the surface."""
     speed = np.linspace(0.0, 1.5 * phase.path.speed, 40)
     figure = Figure(figsize=(5.6, 3.6))
     canvas = figure.add_subplot()
@@ -96,23 +88,17 @@ def _forces(phase: Phase) -> Illustration:
         canvas.plot(1e3 * speed, exerted(phase, rate)[:, :3] @ (way @ rows), color=BLUE, alpha=0.7)
     canvas.axhline(0.0, color=GREY, lw=0.8)
     canvas.set(xlabel="speed along the surface [mm/s]", ylabel="force along the motion [N]")
-    ratio = float(np.mean(_ratio(phase)))
+    fastest = np.zeros((2, len(phase.searched)))
+    fastest[:, 0] = [phase.path.speed, -phase.path.speed]
+    wrench = exerted(phase, fastest)[:, :3]
+    pressed = np.array(phase.push.direction)
+    ratio = float(np.mean(norm(wrench - (wrench @ pressed)[:, None] * pressed) / phase.push.force))
     caption = (
         f"What the search exerts along its motion beside the push of {phase.push.force:.1f} N, for eight directions: "
-        f"what was felt at that velocity, wherever that was. At full speed it is {ratio:.2f} of the push, which is the "
-        "friction that the model has learned."
+        f"the force demonstrated at that velocity, at any place. At full speed it is {ratio:.2f} of the push, which "
+        "is the friction that the model has learned."
     )
     return Illustration("What it exerts on the way", caption, _svg(figure))
-
-
-def _ratio(phase: Phase) -> Float:
-    """Lateral force over push at full speed, both ways along the first coordinate."""
-    rate = np.zeros((2, len(phase.searched)))
-    rate[:, 0] = [phase.path.speed, -phase.path.speed]
-    wrench = exerted(phase, rate)[:, :3]
-    push = np.array(phase.push.direction)
-    lateral: Float = norm(wrench - (wrench @ push)[:, None] * push) / phase.push.force
-    return lateral
 
 
 def _svg(figure: Figure) -> str:

@@ -1,10 +1,9 @@
-r"""All of a search as one trajectory: places and rates of the tool against its start, and the wrench on the way.
+r"""Trajectory of a search: places, rates and the feedforward wrench.
 
     x_d(t) = x_0 + d(t),    R_d(t) = exp(r(t)) R_0,    F_ff(t) = - E[w | v(t)] F_push / E[w_n | v(t)]          eq. (1)
 
-Forces come from the model at the *desired* rate, so that nothing is fed back, and are scaled to the commanded push:
-what is learned is their ratio. Trajectories are numbered; a number and a document always give the same one, so that a
-batch, a trial alone and a retry agree, and a number is planned once. Planning takes a fraction of a second.
+The model takes the *desired* rate, so nothing is fed back. A document and a number always give the same trajectory, in
+a batch, alone and on a retry.
 """
 
 from __future__ import annotations
@@ -25,7 +24,6 @@ from skillframe_search.smoothing import SLACK, STEP_S, Motion, smoothed
 from skillframe_search.tour import tour
 
 NUMBERS = 256
-LEAST_SHARE = 0.3  # of the push: a model that expects less of it is not scaled up any further
 
 
 class Plan(NamedTuple):
@@ -46,7 +44,7 @@ class Plan(NamedTuple):
 
 @lru_cache(maxsize=2 * NUMBERS)
 def plan(phase: _Hashed, number: int) -> Plan:
-    """The trajectory of a number, 0 ... 255."""
+    """The trajectory of a number, 0 to 255."""
     settings = phase.phase
     motion, scale = _motion(settings, np.random.default_rng([21, number]))
     columns = [COORDINATES.index(name) for name in settings.searched]
@@ -61,7 +59,7 @@ def plan(phase: _Hashed, number: int) -> Plan:
 
 
 def dithered(dither: Dither, axes: Float, count: int) -> Float:
-    """(count, 3) the torque that goes round in the surface, and about its normal, every `STEP_S` [Nm]."""
+    """(count, 3) torque that rotates in the surface and about its normal, every `STEP_S` [Nm]."""
     time = np.arange(count) * STEP_S
     tilt, turn = 2.0 * np.pi * dither.tilt_hz * time, 2.0 * np.pi * dither.turn_hz * time
     rocking = dither.tilt_nm * np.stack([np.cos(tilt), np.sin(tilt)], axis=1) @ axes[:2]
@@ -70,21 +68,22 @@ def dithered(dither: Dither, axes: Float, count: int) -> Float:
 
 
 def exerted(phase: Phase, rate: Float) -> Float:
-    """(T, 6) the wrench to exert on the environment at rates (T, k) [m/s through the lever]."""
+    """(T, 6) wrench to exert on the environment at rates (T, k) [m/s through the lever]."""
     push = np.array(phase.push.direction)
     if phase.forces is None:
         return np.tile(np.concatenate([phase.push.force * push, np.zeros(3)]), (len(rate), 1))
     wrench = -phase.forces.wrench(rate)
     along = wrench[:, :3] @ push
     largest = float(np.median(along)) if len(along) else phase.push.force
-    scale = phase.push.force / np.maximum(along, LEAST_SHARE * max(largest, 1e-9))
+    # of the push: forces of a model that expects less are not scaled up further
+    scale = phase.push.force / np.maximum(along, 0.3 * max(largest, 1e-9))
     result: Float = scale[:, None] * wrench
     result[:, :3] += (phase.push.force - result[:, :3] @ push)[:, None] * push
     return result
 
 
 def _motion(phase: Phase, rng: np.random.Generator) -> tuple[Motion, Float]:
-    """The motion (T, k) [m, m/s], and metres per unit of each coordinate (k,)."""
+    """Motion (T, k) [m, m/s], and metres per unit of each coordinate (k,)."""
     path, time = phase.path, phase.stop.time_s
     if path.kind != "spiral" or not path.radius:
         places, scale = _places(phase, rng)
@@ -99,7 +98,7 @@ def _motion(phase: Phase, rng: np.random.Generator) -> tuple[Motion, Float]:
 
 
 def _places(phase: Phase, rng: np.random.Generator) -> tuple[Float, Float]:
-    """The polygon of places (n, k) [m], and metres per unit of each coordinate (k,)."""
+    """Polygon of places (n, k) [m], and metres per unit of each coordinate (k,)."""
     path, k = phase.path, len(phase.searched)
     length = path.speed / SLACK * phase.stop.time_s
     scale = np.array([LEVER if COORDINATES.index(name) >= 2 else 1.0 for name in phase.searched])
@@ -114,7 +113,7 @@ def _places(phase: Phase, rng: np.random.Generator) -> tuple[Float, Float]:
 
 
 class _Hashed:
-    """A phase with its text as identity, so that plans can be kept."""
+    """A phase hashed by its text for the cache."""
 
     def __init__(self, phase: Phase) -> None:
         self.phase, self._text = phase, repr(phase)
@@ -132,7 +131,7 @@ def keyed(phase: Phase) -> _Hashed:
 
 
 def area(document: Document) -> Float:
-    """(2, 3) corners of the box that the search may reach, relative to where it starts, in the search frame [m]."""
+    """(2, 3) corners of the reachable box against the start, in the search frame [m]."""
     phase = read_phase(document)
     axes = surface_axes(np.array(phase.push.direction))
     if phase.exploration is None:

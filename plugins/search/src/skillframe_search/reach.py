@@ -1,9 +1,9 @@
-r"""Going to a place in free air: along the way out first, then straight, and no farther than what is touched.
+r"""Skill that moves to a pose in free air: out of the hole first, then straight, until it touches.
 
-    x_d = x_0 + u (along the legs),    R_d = exp(s rho) R_0,    s: share of the way, rho: turn to the goal's attitude
+    x_d = x_0 + u (along the legs),    R_d = exp(s rho) R_0,    s: share of the way, rho: turn to the goal's orientation
 
-The first leg lifts the tool out, against the way in, up to the height of the goal; it has nothing to do where the tool
-is above. On the second it stops where it feels more than `TOUCH_N`, which is no failure: what follows goes by contact.
+The first leg lifts the tool to the height of the goal, against the way in. On the second, more than `TOUCH_N` ends the
+motion with success, since the next part works in contact.
 """
 
 from __future__ import annotations
@@ -13,38 +13,38 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.frames import Float, Pose, norm, rotation_matrix, rotation_vector
+from skillframe.frames import Float, Pose, dot, norm, rotation_matrix, rotation_vector
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons, rows_of
 
-STIFF = np.diag([1000.0] * 3 + [20.0] * 3)  # N/m, Nm/rad: as LMC's stiff axes
-TOUCH_N, SETTLE_S, SMOOTHING_S = 4.0, 0.3, 0.01
+STIFF = np.diag([1000.0] * 3 + [20.0] * 3)  # N/m, Nm/rad
+TOUCH_N = 4.0
 ROWS = ("_began", "_first", "_second", "_turn", "_felt", "_status", "_reason", "_raised")
 
 
 class Reach(Skill):
-    """Goes to a pose.
+    """Moves to a pose.
 
     Args:
-        goals: (N, 3) positions of the centre of compliance in base, a row for each trial.
-        attitude: (3, 3) of the tool there, in base.
+        goals: (N, 3) positions of the centre of compliance in base.
+        orientation: (3, 3) of the tool there, in base.
         way: (3,) unit vector of the way in.
         speed: [m/s].
-        farthest: a goal farther away than this is refused [m].
+        farthest: largest accepted distance [m].
     """
 
-    def __init__(self, goals: Float, attitude: Float, way: Float, speed: float, farthest: float) -> None:
-        self._goals, self._attitude = goals, attitude
+    def __init__(self, goals: Float, orientation: Float, way: Float, speed: float, farthest: float) -> None:
+        self._goals, self._orientation = goals, orientation
         self._way, self._speed, self._farthest = way, speed, farthest
 
     def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
-        """Plan both legs from where the tools are."""
+        """Plan both legs."""
         n = len(rngs)
         position, rotation = observation.pose.position, observation.pose.rotation
         self._home = Pose(position.copy(), rotation.copy())
-        deep = np.maximum(_dot(position - self._goals, self._way), 0.0)
+        deep = np.maximum(dot(position - self._goals, self._way), 0.0)
         self._first = -deep[:, None] * self._way
         self._second = self._goals - position - self._first
-        self._turn = rotation_vector(self._attitude @ np.swapaxes(rotation, -1, -2))
+        self._turn = rotation_vector(self._orientation @ np.swapaxes(rotation, -1, -2))
         self._raised, self._began = norm(self._first), observation.time.copy()
         self._felt = np.zeros(n)
         self._status, self._reason = np.zeros(n, dtype=np.int64), no_reasons(n)
@@ -58,15 +58,15 @@ class Reach(Skill):
     def restart(
         self, rows: NDArray[np.intp], observation: Observation, rngs: Sequence[np.random.Generator]
     ) -> None:  # fmt: skip
-        """Start again in some trials, from where their tools are now."""
-        fresh = Reach(self._goals[rows], self._attitude, self._way, self._speed, self._farthest)
+        """Start again in the given trials."""
+        fresh = Reach(self._goals[rows], self._orientation, self._way, self._speed, self._farthest)
         fresh.start(rows_of(observation, rows), rngs)
         for name in ROWS:
             getattr(self, name)[rows] = getattr(fresh, name)
         self._home.position[rows], self._home.rotation[rows] = fresh._home
 
     def step(self, observation: Observation) -> Command:
-        """Go on along the legs."""
+        """The next command."""
         across = norm(self._second)
         gone = self._speed * (observation.time - self._began)
         lifted, moved = np.minimum(gone, self._raised), np.clip(gone - self._raised, 0.0, across)
@@ -74,28 +74,18 @@ class Reach(Skill):
         total = np.maximum(self._raised + across, 1e-9)
         share = np.clip(gone / np.maximum(total, 0.02), 0.0, 1.0)
         rotation = rotation_matrix(share[:, None] * self._turn) @ self._home.rotation
-        self._judge(observation, gone, moved, total)
+        force = observation.wrench[:, :3]
+        self._felt += (-dot(force, self._way) - self._felt) * (observation.dt / (0.01 + observation.dt))  # over 10 ms
+        touched = (moved > 0.0) & (self._felt > TOUCH_N)
+        there = gone > np.maximum(total, 0.02) + 0.3 * self._speed  # rests 0.3 s
+        for i in np.flatnonzero((self._status == Status.RUNNING) & (touched | there)).tolist():
+            self._status[i] = Status.SUCCESS
+            self._reason[i] = "touched on the way" if touched[i] else "is there"
         pose = Pose(self._home.position + first + second, rotation)
         zero = np.zeros((len(gone), 6))
         return Command(pose, zero, Impedance(STIFF), zero, self._status.copy(), self._reason.copy())
 
-    def _judge(self, observation: Observation, gone: Float, moved: Float, total: Float) -> None:
-        force = observation.wrench[:, :3]
-        self._felt += (-_dot(force, self._way) - self._felt) * (observation.dt / (SMOOTHING_S + observation.dt))
-        touched = (moved > 0.0) & (self._felt > TOUCH_N)
-        there = gone > np.maximum(total, 0.02) + SETTLE_S * self._speed
-        for i in np.flatnonzero((self._status == Status.RUNNING) & (touched | there)).tolist():
-            self._status[i] = Status.SUCCESS
-            self._reason[i] = "touched on the way" if touched[i] else "is there"
-
 
 def _along(leg: Float, length: Float, gone: Float) -> Float:
-    """(N, 3) the part of a leg that is gone."""
     result: Float = leg * (gone / np.maximum(length, 1e-9))[:, None]
-    return result
-
-
-def _dot(rows: Float, way: Float) -> Float:
-    """(N,) how far rows (N, 3) go along a way (3,), each by itself."""
-    result: Float = rows[:, 0] * way[0] + rows[:, 1] * way[1] + rows[:, 2] * way[2]
     return result

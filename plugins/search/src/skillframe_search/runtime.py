@@ -1,11 +1,10 @@
-r"""The search in the loop, for N trials at once: approach, press, follow the plan, stop when it falls in.
+r"""Search skill for N trials: approach, press, follow the plan, stop when the part falls in.
 
-    approach   x_d moves along the push at approach speed, leading by no more than the push     until it is answered
+    approach   x_d moves along the push at approach speed, leading by no more than the push     until contact
     search     no stiffness along the push; the push grows to its force over 0.2 s; x_d follows the plan (eq. 1)
-    end        SUCCESS when it falls in (`watch`), FAILURE when time is up, nothing is touched, or at a force limit
+    end        SUCCESS when it falls in (`Watch`), FAILURE when time is up, nothing is touched, or at a force limit
 
-It starts from where the tool is, in contact or slightly above, in the attitude it has. What has ended holds still
-where it is. Every row is computed by itself, so a trial's commands do not depend on its neighbours.
+Ended trials hold their pose. Each row is computed by itself, so a trial's commands do not depend on the others.
 """
 
 from __future__ import annotations
@@ -17,18 +16,15 @@ from numpy.typing import NDArray
 
 from skillframe.document.frame import read_frame
 from skillframe.extend.records import Document
-from skillframe.frames import Float, Pose, cross, move_wrench, rotate, rotate_spatial, rotation_matrix
+from skillframe.frames import Float, Pose, cross, dot, move_wrench, rotate, rotate_spatial, rotation_matrix
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons, rows_of
-from skillframe_search.phase import Phase, read_phase
+from skillframe_search.phase import Phase, Push, Stop, read_phase
 from skillframe_search.plan import NUMBERS, keyed, plan
 from skillframe_search.smoothing import STEP_S
-from skillframe_search.watch import Watch
 
-GROWTH_S = 0.2  # the push grows for this long after the touch
 HOLD = 1000.0  # N/m along the push in the approach and at the end
-RUNNING = int(Status.RUNNING)  # a look into the enumeration takes as long as a sum over the batch
-HELD = 0.5  # of the distance commanded: who reached less was held by friction, not slowed by it
-PER_TRIAL = (  # arrays with a row per trial
+RUNNING = int(Status.RUNNING)  # enumeration access is slow in the loop
+PER_TRIAL = (
     "_turn", "_push", "_place", "_rate", "_wrench", "_length", "_lever", "_began", "_touched", "_lead", "_status",
     "_reason", "_stiffness", "_commanded", "_reached",
 )  # fmt: skip
@@ -38,7 +34,7 @@ def build(document: Document) -> SearchSkill:
     """The skill of a document.
 
     Raises:
-        InputError: the document's phase is not as it should be.
+        InputError: the document's phase is invalid.
     """
     frame = read_frame(document)
     return SearchSkill(read_phase(document), frame.from_start, frame.moved)
@@ -48,20 +44,20 @@ class SearchSkill(Skill):
     """A search by feel.
 
     Args:
-        phase: what was learned.
-        in_start_attitude: the search frame has the tool's axes at the start, not those of base.
-        shift: (3,) from where it was learned to the centre of compliance, tool axes.
+        phase: the learned phase.
+        in_start_orientation: the search frame has the tool's axes at the start, not those of base.
+        shift: (3,) from the learning point to the centre of compliance, tool axes.
     """
 
-    def __init__(self, phase: Phase, in_start_attitude: bool, shift: Float) -> None:
+    def __init__(self, phase: Phase, in_start_orientation: bool, shift: Float) -> None:
         self._phase, self._stop, self._shift = phase, phase.stop, shift
-        self._in_start_attitude, self._key = in_start_attitude, keyed(phase)
+        self._in_start_orientation, self._key = in_start_orientation, keyed(phase)
 
     def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
-        """Take the pose as the search frame, and choose a trajectory for each trial."""
+        """Take the pose as the search frame, and choose trajectories."""
         n = len(rngs)
         self._home = Pose(observation.pose.position.copy(), observation.pose.rotation.copy())
-        self._turn = self._home.rotation.copy() if self._in_start_attitude else np.tile(np.eye(3), (n, 1, 1))
+        self._turn = self._home.rotation.copy() if self._in_start_orientation else np.tile(np.eye(3), (n, 1, 1))
         self._push = rotate(self._turn, np.array(self._phase.push.direction))
         plans = [plan(self._key, int(rng.integers(NUMBERS))) for rng in rngs]
         self._place, self._rate, self._wrench = (np.stack([p[i] for p in plans]) for i in range(3))
@@ -78,8 +74,8 @@ class SearchSkill(Skill):
     def restart(
         self, rows: NDArray[np.intp], observation: Observation, rngs: Sequence[np.random.Generator]
     ) -> None:  # fmt: skip
-        """Start again in some trials, from where their tools are now."""
-        fresh = SearchSkill(self._phase, self._in_start_attitude, self._shift)
+        """Start again in the given trials."""
+        fresh = SearchSkill(self._phase, self._in_start_orientation, self._shift)
         fresh.start(rows_of(observation, rows), rngs)
         self._stiffness = self._stiffness.copy()
         for name in PER_TRIAL:
@@ -100,21 +96,17 @@ class SearchSkill(Skill):
         return result
 
     def step(self, observation: Observation) -> Command:
-        """Approach, search or hold, row by row."""
+        """Approach, search or hold in each row."""
         running = self._status == RUNNING
         fallen = self._watch.look(observation) & np.isfinite(self._touched)
-        self._begin(observation, running)
-        self._judge(observation, running & np.isfinite(self._touched), fallen)
-        return self._command(observation)
-
-    def _begin(self, observation: Observation, running: NDArray[np.bool_]) -> None:
-        """Those who touch the surface for the first time begin to search."""
         new = running & np.isinf(self._touched) & self._watch.touched()
         if np.count_nonzero(new):
             self._touched[new] = observation.time[new]
             self._watch.settle(new)
             self._stiffness = self._stiffness.copy()
             self._stiffness[new] = self._gain(0.0, new)
+        self._judge(observation, running & np.isfinite(self._touched), fallen)
+        return self._command(observation)
 
     def _command(self, observation: Observation) -> Command:
         status = self._status
@@ -123,9 +115,15 @@ class SearchSkill(Skill):
         nearing = running & ~searching
         elapsed = np.where(searching, observation.time - np.where(searching, self._touched, 0.0), 0.0)
         place, rate, wrench, turned = self._on_plan(elapsed)
-        self._measure(observation, place, searching)
-        grown = np.where(searching, np.clip(elapsed / GROWTH_S, 0.0, 1.0), 0.0)[:, None]
-        self._advance(observation.dt, nearing)
+        went = observation.pose.position - self._home.position
+        for most, moved in ((self._commanded, place[:, :3]), (self._reached, went)):  # squared, across the push [m2]
+            onto = dot(moved, self._push)
+            np.maximum(most, np.where(searching, dot(moved, moved) - onto * onto, 0.0), out=most)
+        grown = np.where(searching, np.clip(elapsed / 0.2, 0.0, 1.0), 0.0)[:, None]  # of the push after the touch
+        farthest = self._watch.depth + self._phase.push.force / HOLD
+        self._lead = np.where(
+            nearing, np.minimum(self._lead + self._stop.approach_speed * observation.dt, farthest), self._lead
+        )
         along = np.where(searching, self._watch.depth, self._lead)
         position = self._home.position + place[:, :3] + along[:, None] * self._push
         rotation = turned @ self._home.rotation
@@ -138,42 +136,31 @@ class SearchSkill(Skill):
         gain = Impedance(self._stiffness)
         return Command(Pose(position, rotation), twist, gain, grown * wrench, status.copy(), self._reason.copy())
 
-    def _measure(self, observation: Observation, place: Float, searching: NDArray[np.bool_]) -> None:
-        """How far across the push the tool has been sent, and how far it has come, at most and squared [m2]."""
-        went = observation.pose.position - self._home.position
-        for most, moved in ((self._commanded, place[:, :3]), (self._reached, went)):
-            along = _dot(moved, self._push)
-            np.maximum(most, np.where(searching, _dot(moved, moved) - along * along, 0.0), out=most)
-
-    def _advance(self, dt: float, nearing: NDArray[np.bool_]) -> None:
-        """Approach: the desired depth goes on, but never asks for more than the push."""
-        most = self._watch.depth + self._phase.push.force / HOLD
-        onwards = np.minimum(self._lead + self._stop.approach_speed * dt, most)
-        self._lead = np.where(nearing, onwards, self._lead)
-
     def _on_plan(self, elapsed: Float) -> tuple[Float, Float, Float, Float]:
-        """Place, rate and wrench (N, 6) at seconds since the touch, base axes, at the centre, and the place's turn."""
+        """Place, rate and wrench (N, 6) at seconds since the touch, base axes, at the centre, and the turn."""
         last = self._place.shape[1] - 1
         index = np.minimum((elapsed / STEP_S).astype(int), last)
         rate = self._rate[self._row, index]
         place = self._place[self._row, index] + (np.minimum(elapsed, last * STEP_S) - index * STEP_S)[:, None] * rate
         wrench = self._wrench[self._row, index]
-        if self._in_start_attitude:
+        if self._in_start_orientation:
             place, rate, wrench = (rotate_spatial(self._turn, values) for values in (place, rate, wrench))
         turned = rotation_matrix(place[:, 3:])
         if not self._shift.any():
             return place, rate, wrench, turned
         # the learning point follows the place; the centre of compliance turns about it
-        place = _at_center(place, turned, self._lever)
-        return place, rate + _swept(rate, self._lever), move_wrench(wrench, self._lever), turned
+        place, swept = place.copy(), np.zeros_like(rate)
+        place[:, :3] += rotate(turned, self._lever) - self._lever
+        swept[:, :3] = cross(rate[:, 3:], self._lever)
+        return place, rate + swept, move_wrench(wrench, self._lever), turned
 
     def _judge(self, observation: Observation, searching: NDArray[np.bool_], fallen: NDArray[np.bool_]) -> None:
-        """End the trials that have fallen in or met a limit. The first reason stays."""
         stop, force = self._stop, observation.wrench[:, :3]
         squared = force[:, 0] ** 2 + force[:, 1] ** 2 + force[:, 2] ** 2
         over = squared > stop.force_limit_n**2
         late = searching & (observation.time - self._touched >= stop.time_s)
-        lost = ~searching & ((self._watch.depth > stop.approach_m) | (self._waited(observation)))
+        longest = 2.0 * stop.approach_m / stop.approach_speed
+        lost = ~searching & ((self._watch.depth > stop.approach_m) | (observation.time - self._began > longest))
         ending = (self._status == RUNNING) & (fallen | over | late | lost)
         for i in np.flatnonzero(ending).tolist() if np.count_nonzero(ending) else ():
             found, hard = bool(fallen[i]), bool(over[i])
@@ -182,11 +169,6 @@ class SearchSkill(Skill):
             self._end.position[i], self._end.rotation[i] = observation.pose.position[i], observation.pose.rotation[i]
             self._stiffness = self._stiffness.copy()
             self._stiffness[i] = self._gain(HOLD, np.arange(len(ending)) == i)[0]
-
-    def _waited(self, observation: Observation) -> NDArray[np.bool_]:
-        longest = 2.0 * self._stop.approach_m / self._stop.approach_speed
-        result: NDArray[np.bool_] = observation.time - self._began > longest
-        return result
 
     def _verdict(self, i: int, found: bool, hard: bool, late: bool, seconds: float, squared: float) -> tuple[int, str]:
         if hard:
@@ -197,7 +179,8 @@ class SearchSkill(Skill):
         if late:
             way = 1e3 * self._length[i]
             sent, came = (1e3 * float(np.sqrt(squares[i])) for squares in (self._commanded, self._reached))
-            held = ": friction holds the tool" if came < HELD * sent else ""
+            # of the commanded distance: less was held by friction
+            held = ": friction holds the tool" if came < 0.5 * sent else ""
             return Status.FAILURE, (
                 f"searched for {seconds:.1f} s along {way:.0f} mm and did not fall in; commanded {sent:.1f} mm, "
                 f"reached {came:.1f} mm{held}"
@@ -206,21 +189,52 @@ class SearchSkill(Skill):
         return Status.FAILURE, f"touched no surface within {went:.0f} mm of the start; start the search nearer to it"
 
 
-def _dot(a: Float, b: Float) -> Float:
-    """Row-wise dot product (N,) of (N, 3) arrays in one fixed order of additions."""
-    result: Float = a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
-    return result
+class Watch:
+    r"""Detects from pose and wrench that a part has fallen in, in N trials, each row by itself.
 
+        answer  n = - w . push          low-passed over 20 ms       reaction of the surface
+        surface s                       depth along the push, low-passed over 0.5 s, while n is above its share of it
+        fallen  <=>  depth - s > drop  and  n fell below its share of the push within the last second
 
-def _at_center(place: Float, turned: Float, lever: Float) -> Float:
-    """Displacement of the centre of compliance: that of the learning point, and its own turn (N, 3, 3) about it."""
-    result = place.copy()
-    result[:, :3] += rotate(turned, lever) - lever
-    return result
+    Depth alone would mistake a slope for a hole, and the reaction alone a bump.
 
+    Attributes:
+        answer: (N,) reaction of the surface [N].
+        depth: (N,) along the push since the start [m].
+    """
 
-def _swept(rate: Float, lever: Float) -> Float:
-    """What the turning adds to the centre's velocity, to first order in the turn since the start."""
-    result = np.zeros_like(rate)
-    result[:, :3] = cross(rate[:, 3:], lever)
-    return result
+    def __init__(self, push: Push, stop: Stop, direction: Float, observation: Observation) -> None:
+        count = len(observation.time)
+        self._push, self._stop, self._direction = push, stop, direction.copy()
+        self._home = observation.pose.position.copy()
+        self.answer, self.depth = np.zeros(count), np.zeros(count)
+        self._surface, self._lost = np.zeros(count), np.full(count, -np.inf)
+
+    def replace(self, rows: NDArray[np.intp], other: Watch) -> None:
+        """Replace the state of some trials by that of another watch of these alone."""
+        for name in ("_direction", "_home", "answer", "depth", "_surface", "_lost"):
+            getattr(self, name)[rows] = getattr(other, name)
+
+    def touched(self) -> NDArray[np.bool_]:
+        """Trials that press against something now."""
+        result: NDArray[np.bool_] = self.answer > self._stop.touch_n
+        return result
+
+    def settle(self, rows: NDArray[np.bool_]) -> None:
+        """Take the present depth as the surface."""
+        self._surface[rows] = self.depth[rows]
+        self._lost[rows] = -np.inf
+
+    def look(self, observation: Observation) -> NDArray[np.bool_]:
+        """Take in an observation, and return which trials have fallen in (N,)."""
+        dt = observation.dt
+        felt = -dot(observation.wrench[:, :3], self._direction)
+        self.answer = self.answer + (felt - self.answer) * (dt / (0.02 + dt))
+        self.depth = dot(observation.pose.position - self._home, self._direction)
+        pressed = self.answer > self._stop.lost_share * self._push.force
+        followed = self._surface + (self.depth - self._surface) * (dt / (0.5 + dt))
+        self._surface = np.where(pressed, followed, self._surface)
+        self._lost = np.where(pressed, self._lost, observation.time)
+        deep = self.depth - self._surface > self._stop.drop_m
+        result: NDArray[np.bool_] = deep & (observation.time - self._lost < 1.0)
+        return result

@@ -1,15 +1,17 @@
-"""A seating document from demonstrations: the push from their contact, the place from their poses, the search beside.
+"""Learn a seating document: the push from the demonstrated contact, the place from the poses, and a search.
 
-The push is learned from what each demonstration shows from shortly before its first contact on. From the demonstrations
-come the push (at --at), and at the tool's tip the way (from the first contact to the end), the end with its attitude,
-and the height of the first contact. The end is as deep as the deepest, since who ends higher stopped short of the
-bottom; where all ended without pressing there is none, and it is the mean. Loose parts touch only near the end, and how
-they slide there is not the way: where the tip came straight from more than twice as far, and more than 30 degrees
-otherwise than it went in contact, the way is that straight and begins with it. So it is where they touch within
-`LEAST_M` of the end and rest there, as at the bottom of a shallow hole that is wide; who still begins so near says
-nothing of the way, if others do, and where all do it is the way in which they pressed at rest, `LEAST_M` long (our
-choices). The part goes straight in: a turn that was shown only aligned it. From the user comes how far off the fixture
-may be. The rest is by hand. The search is as wide as the mouth can be off its place, both ways at once (our choice):
+At the tool's tip, the way goes from the first contact to the end. The end is the deepest one, since others stopped
+short of the bottom, or the mean where all ended without pressing. Exceptions of the way:
+
+- Loose parts touch near the end only and slide there. A straight line of more than twice that length, at more than 30
+  degrees to the way in contact, is the way; likewise for parts that touch within `LEAST_M` of the end and rest there.
+- Demonstrations that still begin so near are ignored if others give a way; else the way is the direction of their
+  press, `LEAST_M` long.
+
+A removal, which takes the part out, is turned round in time: its end is the place before the hole, and the push is
+written by hand.
+
+The search covers the fixture's error on two axes:
 
     radius = sqrt(2) (shift + tilt * height of the first contact)
 """
@@ -20,15 +22,14 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from math import degrees, radians, sqrt
 from pathlib import Path
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
-from skillframe.conditioning.audit import audit
 from skillframe.config import build
+from skillframe.demonstration.contact import contact_evidence
 from skillframe.demonstration.record import Demonstration, resolve_point
-from skillframe.demonstration.together import common_frames
-from skillframe.document.frame import with_center
+from skillframe.document.frame import common_frames, with_center
 from skillframe.errors import InputError
 from skillframe.extend.reading import read_demonstration
 from skillframe.extend.records import Document, LearnOptions, SkillType, Stalled
@@ -36,60 +37,60 @@ from skillframe.extend.registry import registry
 from skillframe.frames import Float, Pose, cross, norm, rotation_vector, unit
 from skillframe_search.learner import plain
 from skillframe_search.seat_document import Seat, as_phase
+from skillframe_search.straight import straight_push
 
-BEFORE_S = 0.3  # of each demonstration before its contact that the push is learned with
+BEFORE_S = 0.3  # before the contact that the push is learned with
 LEAST_M = 0.002  # from the first contact to the end
-SCREWED = radians(15.0)  # about the way, from the first contact to the end, in the mean; more is taken for a screw
-RESTED_S, RESTED_M = 0.1, 0.0005  # where that is shorter: it stood at the end, in contact, for so long within so much
-STRAIGHT = 0.15  # of its length that a straight way is off its line, at most
+SCREWED = radians(15.0)  # mean turn about the way from contact to end; more is a screw
+STRAIGHT = 0.15  # of its length: deviation of a straight way from its line
+RESTED_S, RESTED_M = 0.1, 0.0005  # rest at the end in contact, where the way is shorter
 SLID = np.cos(radians(30.0))  # between that way and the one in contact; more is no insertion
-_LOOKED_AT = 200  # samples before the contact
 FREE_N, STOP_M = 3.6, 0.001
-"""Demonstrations that all rest at their ends with less show a part that nothing stops; it is stopped over so much.
+"""Less than FREE_N [N] at rest at all ends: nothing stops the part, and the push fades over STOP_M [m].
 
-Of AutoMate's parts those that nothing stops leant on their posts with up to 3.1 N. All others were pressed with 11 N
-and more but for one (00700, once with 4.2 N at least). A mistake either way costs nearly all trials (ours).
-"""
-PRESSING_N = 3.0  # at rest at the end, at least, of demonstrations whose way is that of their press
+Of AutoMate's parts, unstopped ones showed up to 3.1 N, stopped ones 4.2 N and more; a wrong decision fails nearly all
+trials."""
 PRESSED_S, SAME_M, RESTING_M_S = 0.1, 3e-4, 1e-3
-"""For how long, how near their ends, and how slowly that is [s, m, m/s] (ours)."""
-ABOVE_M, MOST_ABOVE_M = 0.002, 0.005  # over the first contact, and at most where demonstrations began higher
+"""Duration, distance from the end and speed of a press [s, m, m/s]."""
 PREFIX = "search_"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SeatSettings:
-    """What `--set` changes, beside the settings of the push's learner, and those of a learned search as search_NAME.
+    """Settings of `--set`, beside those of the push's learner and search_NAME of a learned search.
 
     Attributes:
         skill: kind of skill that pushes.
         exception: kind of skill that searches where the push stalls.
-        blind: files of blind demonstrations, for a search that is learned from them.
-        place: "base", where it was demonstrated, or "start": as far from the run's start as it was from theirs.
-        shift: how far off the fixture may be across the way [m].
-        tilt: how far off it may be turned [rad].
-        height: how far off it may be along the way [m].
+        blind: files of blind demonstrations for a learned search.
+        removal: the demonstrations take the part out, and end as soon as it is. Turned round in time they give place,
+            way and orientation, and no push: that is a straight one.
+        stopped: whether something stops the part at its end, which a removal does not show.
+        place: "base": as demonstrated; "start": relative to the start of the run.
+        shift: largest error of the fixture across the way [m].
+        tilt: largest error of its orientation [rad].
+        height: largest error along the way [m].
         friction: between the parts [1].
-        approach: whether it goes to where contact began first.
-        search: whether it searches on a stall.
-        tries: searches and returns before it gives up.
-        round: how the part is turned about its way does not matter, as of a round peg.
-        settle: how long it is rocked where it rests near the end, so that a loose part stands flush [s].
+        approach: whether it first goes to where contact began.
+        tries: searches, swings and returns before it gives up; 0: it fails where the push stalls.
+        round: the turn about the way does not matter, as of a round peg.
+        settle: duration of rocking near the end, so that a loose part stands flush [s].
     """
 
     skill: str = "lmc"
     exception: str = "search"
     blind: tuple[str, ...] = ()
+    removal: bool = False
+    stopped: bool = True
     place: Literal["base", "start"] = "base"
     shift: float = 0.002
     tilt: float = radians(5.0)
     height: float = 0.0005
     friction: float = 0.5
     approach: bool = True
-    search: bool = True
     tries: int = 8
     round: bool = False
-    settle: float = 0.0
+    settle: float = 0.5
 
     def __post_init__(self) -> None:
         limits = {"shift": 0.05, "tilt": 0.6, "height": 0.05, "friction": 2.0, "tries": 100, "settle": 10.0}
@@ -98,21 +99,21 @@ class SeatSettings:
                 raise InputError(f"--set {name}", f"should be 0 to {most:g}, is {getattr(self, name):g}", "fix it")
 
 
-class _Shown(NamedTuple):
-    """What one demonstration shows of the place, in base.
+class Shown(NamedTuple):
+    """Place of one demonstration, in base.
 
     Attributes:
-        start, contact, end: three points (3,) of its way [m].
-        attitude: (3, 3) at its end.
-        pressing: (3,) mean force over the last `RESTED_S` of its contact; zero if it did not rest there [N].
-        time, position, force: (T,), (T, 3), (T, 3) of the point, and of what the tool exerts on the parts [s, m, N].
+        start, contact, end: (3,) points of its way [m].
+        orientation: (3, 3) at its end.
+        pressing: (3,) mean force over its last `RESTED_S`; zero without a rest [N].
+        time, position, force: (T,), (T, 3), (T, 3) of the point, and of the tool on the parts [s, m, N].
         part: from shortly before its contact on.
     """
 
     start: Float
     contact: Float
     end: Float
-    attitude: Float
+    orientation: Float
     pressing: Float
     time: Float
     position: Float
@@ -121,30 +122,43 @@ class _Shown(NamedTuple):
 
 
 def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
-    """The body of a seating document.
+    """Body of a seating document.
 
     Raises:
         InputError: axes other than base, a demonstration without contact or way, or an unknown setting.
         UnknownName: no such kind of skill, or none that is an exception strategy.
     """
-    settings, own, searching = _sorted(options)
+    names, given = SeatSettings.__dataclass_fields__, dict(options.settings)
+    mine = {key: given.pop(key) for key in list(given) if key in names}
+    searching = {key.removeprefix(PREFIX): given.pop(key) for key in list(given) if key.startswith(PREFIX)}
+    settings = build(SeatSettings, mine, "--set")  # those left over are of the push's learner
     if options.axes != "base":
         raise InputError("--axes", "a seating knows its place in base axes", "leave --axes out")
     frames = common_frames(demonstrations)
     point = resolve_point("tip" if "tip" in frames else options.at, frames)
-    shown = [_shown(each, point) for each in demonstrations]
-    seat = _seat(shown, point, settings)
-    push = registry().skill(settings.skill)
-    if push.learn is None:
-        raise InputError(f"--skill {push.name}", "is not learned from demonstrations", "name one that is, such as lmc")
-    body = push.learn(
-        [_pushed(each, seat) for each in shown], replace(options, settings=own, toward=seat.way, straight=True)
-    )
+    shown = [(_taken_out if settings.removal else _shown)(each, point) for each in demonstrations]
+    seat = seat_of(shown, point, settings)
+    push = registry().skill("lmc" if settings.removal else settings.skill)
+    if settings.removal:
+        given |= {"skill": settings.skill} if settings.skill != push.name else {}
+        if given:
+            raise InputError(
+                f"--set {next(iter(given))}", "is of a learned push, and a removal shows none", "leave it out"
+            )
+        body = straight_push({**frames, "tip": point.tolist()}, np.array(seat.way))
+    elif push.learn is None:
+        raise InputError(
+            f"--set skill={push.name}", "is not learned from demonstrations", "name one that is, such as lmc"
+        )
+    else:
+        body = push.learn(
+            [_pushed(each, seat) for each in shown], replace(options, settings=given, toward=seat.way, straight=True)
+        )
     at_point = with_center({"frame": {**body["frame"], "learned_at": point.tolist()}}, point.tolist())
     stalled = Stalled(
         way=seat.way, radius=sqrt(2.0) * (seat.shift_m + seat.tilt_rad * seat.contact_m), tilt=seat.tilt_rad,
         near=sqrt(2.0) * seat.shift_m,
-        friction=seat.friction, frame=at_point["frame"],
+        friction=settings.friction, frame=at_point["frame"],
         options=replace(options, at=",".join(map(str, point.tolist())), settings=searching),
         blind=[read_demonstration(Path(file)) for file in settings.blind],
     )  # fmt: skip
@@ -163,26 +177,21 @@ def exception_strategy(name: str) -> SkillType:
     """The kind of skill of a name, if it can search where another stalls.
 
     Raises:
-        UnknownName: there is none. InputError: it cannot, with those that can.
+        UnknownName: there is none.
+        InputError: it cannot.
     """
     kind = registry().skill(name)
     if kind.exception is None:
         able = [each for each in registry().names("skill") if registry().skill(each).exception is not None]
-        raise InputError(f"--exception {name}", f"a {name} skill is no exception strategy", f"name {', '.join(able)}")
+        raise InputError(
+            f"--set exception={name}", f"a {name} skill is no exception strategy", f"name {', '.join(able)}"
+        )
     return kind
 
 
-def _sorted(options: LearnOptions) -> tuple[SeatSettings, dict[str, Any], dict[str, Any]]:
-    """Settings of the seating, of the push's learner, and of the search's."""
-    names, given = SeatSettings.__dataclass_fields__, dict(options.settings)
-    mine = {key: given.pop(key) for key in list(given) if key in names}
-    searching = {key.removeprefix(PREFIX): given.pop(key) for key in list(given) if key.startswith(PREFIX)}
-    return build(SeatSettings, mine, "--set"), given, searching
-
-
-def _shown(demonstration: Demonstration, point: Float) -> _Shown:
+def _shown(demonstration: Demonstration, point: Float) -> Shown:
     where = demonstration.source or "demonstration"
-    contacts = audit(demonstration).contacts
+    contacts = contact_evidence(demonstration).contacts
     if not contacts:
         raise InputError(where, "never touches anything", "record until the part is seated")
     began = float(contacts[0][0])
@@ -193,18 +202,41 @@ def _shown(demonstration: Demonstration, point: Float) -> _Shown:
     moved = float(norm(position[last][0] - position[last][-1]))
     rested = contacts[-1][1] - began >= RESTED_S and moved < RESTED_M
     brief = LEAST_M if rested else 0.0
-    return _Shown(
-        position[0], _way_begins(position, first, brief), position[-1], pose.rotation[-1],
+    return Shown(
+        position[0], way_begins(position, first, brief), position[-1], pose.rotation[-1],
         force[last].mean(axis=0) * rested, demonstration.time, position, force,
         demonstration.between(began - BEFORE_S, None),
     )  # fmt: skip
 
 
-def _pressed_at_end(shown: _Shown, way: Float) -> float:
-    """The largest mean force [N] along the way over `PRESSED_S` in which the tool rested at the end.
+def _taken_out(removal: Demonstration, point: Float) -> Shown:
+    """The place that a removal shows, turned round in time. It ends as soon as the part is out, at the entrance.
 
-    It is infinite where the tool never did. Who lets go at a bottom has pressed on it before.
+    Raises:
+        InputError: it does not go straight.
     """
+    pose = removal.pose
+    position = Pose(pose.position, pose.rotation).at(point).position[::-1]
+    away = position - position.mean(axis=0)
+    way: Float = np.linalg.svd(away, full_matrices=False)[2][0]  # principal direction, against noise of single samples
+    way = way * np.sign(way @ (position[-1] - position[0]))
+    length = float(way @ (position[-1] - position[0]))
+    aside = float(norm(away - (away @ way)[:, None] * way).max())
+    if length < LEAST_M or aside > STRAIGHT * length:
+        what = f"goes {1e3 * length:.1f} mm from first to last sample, and up to {1e3 * aside:.1f} mm aside"
+        raise InputError(
+            removal.source or "removal", what, "record from the assembled pose until the part is out, and no longer"
+        )
+    begins = position[-1] - length * way
+    # Forces are left out: friction points the other way in an insertion
+    return Shown(
+        begins, begins, position[-1], pose.rotation[0], np.zeros(3), removal.time, position,
+        np.zeros_like(position), removal,
+    )  # fmt: skip
+
+
+def _pressed_at_end(shown: Shown, way: Float) -> float:
+    """Largest mean force [N] along the way over `PRESSED_S` at rest at the end, infinite without a rest."""
     window = max(1, round(PRESSED_S / float(np.median(np.diff(shown.time)))))
     if window >= len(shown.time):
         return np.inf
@@ -215,14 +247,14 @@ def _pressed_at_end(shown: _Shown, way: Float) -> float:
     return float(mean[there].max()) if there.any() else np.inf
 
 
-def _way_begins(position: Float, first: int, brief: float = 0.0) -> Float:
-    """Where (3,) the way of a tip (T, 3) to its last place begins.
+def way_begins(position: Float, first: int, brief: float = 0.0) -> Float:
+    """Where (3,) the way of a tip (T, 3) begins.
 
-    That is at sample `first`, or before if it slid from there, or came no further than `brief` [m].
+    At sample `first`, or earlier if the tip slid or came within `brief` [m].
     """
     touched = position[-1] - position[first]
     short = float(norm(touched)) < brief
-    for i in np.unique(np.linspace(0, first, _LOOKED_AT).astype(int)).tolist():
+    for i in np.unique(np.linspace(0, first, 200).astype(int)).tolist():  # samples before the contact
         left = position[-1] - position[i:]
         length = float(norm(left[0]))
         if length <= 2.0 * float(norm(touched)):
@@ -234,22 +266,27 @@ def _way_begins(position: Float, first: int, brief: float = 0.0) -> Float:
     return np.asarray(position[first])
 
 
-def _pushed(shown: _Shown, seat: Seat) -> Demonstration:
-    """What shows the push: all from the contact on, or where nothing stops the part, until it is at its end."""
+def _pushed(shown: Shown, seat: Seat) -> Demonstration:
+    """The part that shows the push, up to the end where nothing stops the part."""
     if not seat.stop_m:
         return shown.part
     along = shown.position @ np.array(seat.way)
     return shown.part.between(None, float(shown.time[np.argmax(along > along[-1] - SAME_M)]))
 
 
-def _seat(shown: Sequence[_Shown], point: Float, settings: SeatSettings) -> Seat:
+def seat_of(shown: Sequence[Shown], point: Float, settings: SeatSettings) -> Seat:
+    """Place of the part, its uncertainty and the settings, from demonstrations of a point (3,) of the tool [m].
+
+    Raises:
+        InputError: no way from first contact to end, or a turn about it.
+    """
     start, end = np.mean([s.start for s in shown], axis=0), np.mean([s.end for s in shown], axis=0)
     telling = [s.end - s.contact for s in shown if norm(s.end - s.contact) >= LEAST_M]
     if not telling and (pressed := _pressed_way(shown)) is not None:
         telling = [LEAST_M * pressed]
     contact = end - np.mean(telling or [s.end - s.contact for s in shown], axis=0)
     depth = float(norm(end - contact))
-    if not telling or depth < 0.5 * LEAST_M:  # or ways that contradict each other
+    if not telling or depth < 0.5 * LEAST_M:  # or contradictory ways
         raise InputError(
             "learn", f"the demonstrations go {1e3 * depth:.1f} mm from first contact to end, which seats nothing",
             "record until the part is seated, and begin before it touches",
@@ -258,39 +295,41 @@ def _seat(shown: Sequence[_Shown], point: Float, settings: SeatSettings) -> Seat
     if not settings.round:
         _goes_straight(shown, way)
     free = all(_pressed_at_end(each, way) < FREE_N for each in shown)
-    if not free:  # nobody goes deeper than the bottom, and some stop short of it
+    if settings.removal:
+        free = not settings.stopped
+    if not free:  # some stop short of the bottom
         moved = settings.place == "start"
         further = max(float((each.end - end - (each.start - start) * moved) @ way) for each in shown)
         end, depth = end + further * way, depth + further
-    left, _, right = np.linalg.svd(np.sum([each.attitude for each in shown], axis=0))
+    left, _, right = np.linalg.svd(np.sum([each.orientation for each in shown], axis=0))
     mean = left @ right  # of rotations
-    leant = max(float(norm(cross(each.attitude.T @ way, mean.T @ way))) for each in shown)
-    above = float(np.clip((end - start) @ way, depth + ABOVE_M, depth + MOST_ABOVE_M))
+    leant = max(float(norm(cross(each.orientation.T @ way, mean.T @ way))) for each in shown)
     return Seat(
         way=_vector(way), point=_vector(point), end=_vector(end), start=_vector(start),
-        attitude=_vector(rotation_vector(mean)), leant_rad=float(np.arcsin(min(leant, 1.0))),
-        contact_m=depth, above_m=above, place=settings.place, shift_m=settings.shift, tilt_rad=settings.tilt,
-        height_m=settings.height, friction=settings.friction, approach=settings.approach, search=settings.search,
-        stop_m=STOP_M if free else 0.0, tries=settings.tries, settle_s=settings.settle,
+        orientation=_vector(rotation_vector(mean)), leant_rad=float(np.arcsin(min(leant, 1.0))),
+        contact_m=depth, place=settings.place, shift_m=settings.shift, tilt_rad=settings.tilt,
+        height_m=settings.height, approach=settings.approach, stop_m=STOP_M if free else 0.0, tries=settings.tries,
+        settle_s=settings.settle,
     )  # fmt: skip
 
 
-def _pressed_way(shown: Sequence[_Shown]) -> Float | None:
-    """The way (3,) in which all pressed at rest at their ends, within 30 degrees of it and of how they came, if any."""
-    ways = np.array([unit(s.pressing) for s in shown if norm(s.pressing) >= PRESSING_N])
+def _pressed_way(shown: Sequence[Shown]) -> Float | None:
+    """Common (3,) direction of the press at the ends, within 30 degrees of each and of the way they came, or None."""
+    # least force at rest of a way taken from the press
+    ways = np.array([unit(s.pressing) for s in shown if norm(s.pressing) >= 3.0])
     if len(ways) < len(shown):
         return None
     mean, came = unit(ways.mean(axis=0)), np.array([unit(s.end - s.start) for s in shown])
     return mean if min((ways @ mean).min(), (came @ mean).min()) > SLID else None
 
 
-def _goes_straight(shown: Sequence[_Shown], way: Float) -> None:
-    """Raise `InputError` if the part was turned about its way from the contact on, as a bayonet is."""
-    turned = [rotation_vector(s.attitude @ s.part.pose.rotation[0].T) @ way for s in shown]
+def _goes_straight(shown: Sequence[Shown], way: Float) -> None:
+    """Raise `InputError` if the part was turned about its way in contact, as a bayonet is."""
+    turned = [rotation_vector(s.orientation @ s.part.pose.rotation[0].T) @ way for s in shown]
     if (mean := abs(float(np.mean(turned)))) > SCREWED:
         raise InputError(
             "learn", f"the part was turned by {degrees(mean):.0f} degrees about its way, which a seating does not do",
-            "leave --exception out, and the push learns the turn; or --set round=true, if it is a round peg",
+            "leave --skill seat out, and the push learns the turn; or --set round=true, if it is a round peg",
         )  # fmt: skip
 
 

@@ -1,12 +1,8 @@
-r"""Searches that learn nothing of where to look: a spiral and a random walk around the start.
+r"""Baseline searches around the start: an Archimedean spiral and a random walk.
 
-Archimedean spiral: r = pitch t / 2 pi, walked at constant speed; with several layers, one after the other, each at its
-own turn about the normal. Random walk: steps of one length in a random direction, drawn again where they would leave a
-circle. The seed names both as what a search is compared with; pitch, step and reach are ours.
-
-A spiral with a radius turns back there and comes in again the other way round, its pitch 0.6 and its speed 0.8 of what
-they were, out again and so on: what a pass ran over, the next one finds. Along it v = min(v_max, sqrt(a r)), so that
-the inner turns are slow enough to be followed (ours).
+Spiral: r = pitch t / 2 pi at constant speed, layers at their own turn about the normal. Random walk: steps of one
+length within a circle. A spiral with a radius returns reversed, each pass with 0.6 of the pitch and 0.8 of the speed,
+at v = min(v_max, sqrt(a r)), slow enough for inner turns.
 """
 
 from __future__ import annotations
@@ -17,15 +13,14 @@ import numpy as np
 
 from skillframe.frames import Float, norm, unit
 
-FINE = 2e-4  # m between the spiral's points
+FINE = 2e-4  # m between points
 FINER, SLOWER = 0.6, 0.8  # of pitch and speed, each further pass
-INNER_PASSES = 2  # so that the wide ones begin in the middle again
 
 
 def spiral(dimensions: int, pitch: float, length: float, layers: Sequence[float] = (0.0,)) -> Float:
-    """(n, k) places [m]: each layer takes its share of the length. A layer is an offset of the last coordinate."""
+    """(n, k) places [m], where each layer offsets the last coordinate and takes its share of the length."""
     share = length / len(layers)
-    last = np.sqrt(4.0 * np.pi * share / pitch)  # the length up to angle t is p t^2 / 4 pi, but for the first turn
+    last = np.sqrt(4.0 * np.pi * share / pitch)  # length up to angle t is p t^2 / 4 pi, except in the first turn
     angle = np.sqrt(np.linspace(0.0, last**2, max(round(share / FINE), 16)))
     flat = (pitch * angle / (2.0 * np.pi))[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
     parts = []
@@ -41,12 +36,13 @@ def spiral(dimensions: int, pitch: float, length: float, layers: Sequence[float]
 def there_and_back(
     pitch: float, radius: float, speed: float, acceleration: float, passes: int, step: float, inner: float = 0.0
 ) -> Float:
-    """(n, 2) places [m] every `step` seconds: a spiral out to a radius, and finer ones in and out again.
+    """(n, 2) places [m] every `step` seconds: a spiral to a radius, and finer ones in and out again.
 
-    Before that, if `inner` is not 0, out and in again within that radius.
+    If `inner` is not 0, that radius is covered out and in first.
     """
     parts = [np.zeros((1, 2))]
-    for reach, count in ((inner, INNER_PASSES if inner else 0), (radius, passes)):
+    # even, so that the wide ones begin in the middle
+    for reach, count in ((inner, 2 if inner else 0), (radius, passes)):
         for k in range(count):
             way = _outwards(pitch * FINER**k, reach, speed * SLOWER**k, acceleration, step)
             parts.append(way if k % 2 == 0 else way[::-1] @ _turned(way[-1], parts[-1][-1]))
@@ -54,7 +50,7 @@ def there_and_back(
 
 
 def _outwards(pitch: float, radius: float, speed: float, acceleration: float, step: float) -> Float:
-    """(n, 2) places of an Archimedean spiral from the middle to a radius, by the law of the module's text."""
+    """(n, 2) places of a spiral from the middle to a radius, at the module's speed."""
     angle = np.linspace(0.0, 2.0 * np.pi * radius / pitch, max(round(np.pi * radius**2 / pitch / FINE), 64))
     r = pitch * angle / (2.0 * np.pi)
     rate = np.minimum(speed, np.sqrt(acceleration * np.maximum(r, pitch / (2.0 * np.pi))))
@@ -66,14 +62,14 @@ def _outwards(pitch: float, radius: float, speed: float, acceleration: float, st
 
 
 def _turned(from_: Float, to: Float) -> Float:
-    """(2, 2) what turns rows so that the bearing of one place is that of another."""
+    """(2, 2) rotation of rows from the bearing of one place to that of another."""
     angle = np.arctan2(to[1], to[0]) - np.arctan2(from_[1], from_[0])
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, s], [-s, c]])
 
 
 def random_walk(dimensions: int, step: float, reach: float, length: float, rng: np.random.Generator) -> Float:
-    """(n, k) places [m] of a walk of at least `length`, never farther than `reach` from the start."""
+    """(n, k) places [m] of a walk of at least `length`, within `reach` of the start."""
     path = [np.zeros(dimensions)]
     while (len(path) - 1) * step < length:
         there = path[-1] + step * unit(rng.standard_normal(dimensions))

@@ -1,13 +1,9 @@
-r"""From a polygon of places to a motion that a robot can follow: a convex program with bounds.
+r"""Bounded motion along a polygon of places, by a convex program.
 
     min  |X - X_ref|^2 + w |D3 X|^2     such that  |v_k| <= v_max,  |a_k| <= a_max,  X_0 = X_ref,0
 
-with v and a the first and second differences of X over 20 ms and X_ref the polygon walked at constant speed. The norms
-of the two coordinates along the surface are bounded by an octagon inscribed in the circle, so that the bound holds
-for the true speed; other coordinates are bounded one by one. A quadratic program for casadi's `conic` with OSQP, in
-millimetres so that its tolerances mean something. The reference is slower than the limit by `SLACK`, so that the
-motion can catch up after corners. A free-time program with way points as constraints was tried and does not converge
-in useful time (all figures ours).
+v and a are differences of X over 20 ms, X_ref the polygon at constant speed, slower by `SLACK` to catch up after
+corners. An inscribed octagon bounds the coordinates along the surface. Millimetres suit OSQP's tolerances.
 """
 
 from __future__ import annotations
@@ -22,20 +18,18 @@ from skillframe.frames import Float, norm
 
 STEP_S = 0.02
 SLACK = 1.05
-WEIGHT = 2.0  # of the third difference in mm
-MARGIN = 0.98  # of the bounds: OSQP meets them to a per cent
 SIDES = 4  # pairs of parallel sides: an octagon
 
 
 class Motion(NamedTuple):
-    """A trajectory on a grid of 20 ms: places (T, k) [m] and rates (T, k) [m/s], each held until the next."""
+    """Places (T, k) [m] and rates (T, k) [m/s] every 20 ms, rates constant until the next."""
 
     place: Float
     rate: Float
 
 
 def walked(places: Float, speed: float, duration: float) -> Float:
-    """(T, k) the polygon walked at constant speed, a place every 20 ms. It stays at its end."""
+    """(T, k) the polygon at constant speed, a place every 20 ms, resting at its end."""
     travelled = np.concatenate([[0.0], np.cumsum(norm(np.diff(places, axis=0)))])
     along = np.arange(round(duration / STEP_S) + 1) * STEP_S * speed
     keep = np.concatenate([[True], np.diff(travelled) > 1e-12])
@@ -46,13 +40,13 @@ def smoothed(places: Float, speed: float, acceleration: float, duration: float) 
     """The polygon as a motion within bounds.
 
     Args:
-        places: (n, k) corners [m], the first is where it starts; two or more coordinates along the surface come first.
+        places: (n, k) corners [m] from the start; two or more coordinates along the surface come first.
         speed: limit [m/s].
         acceleration: limit [m/s^2].
         duration: [s].
 
     Raises:
-        SkillframeError: the optimisation fails, which a convex program that starts at rest never should.
+        SkillframeError: the optimisation fails.
     """
     reference = 1e3 * walked(places, speed / SLACK, duration)
     program = _program(*reference.shape, round(1e6 * speed), round(1e6 * acceleration))
@@ -77,13 +71,13 @@ class _Program(NamedTuple):
     dimensions: int
 
     def bounds(self, start: Float) -> tuple[Float, Float]:
-        """Of the rows: |v|, |a| below the limit, and the first place where it starts."""
+        """Bounds of the rows: |v|, |a|, and the first place."""
         return np.concatenate([-self.limit, start]), np.concatenate([self.limit, start])
 
 
 @lru_cache(maxsize=16)
 def _program(count: int, k: int, speed: int, acceleration: int) -> _Program:
-    """The program of T = count places in k dimensions, with speed [um/s] and acceleration [um/s^2]."""
+    """Program of T = count places in k dimensions, with speed [um/s] and acceleration [um/s^2]."""
     import casadi
     from scipy import sparse
 
@@ -91,12 +85,13 @@ def _program(count: int, k: int, speed: int, acceleration: int) -> _Program:
     first = sparse.diags([-ones, ones], [0, 1], shape=(count - 1, count))
     second = sparse.diags([ones, -2.0 * ones, ones], [0, 1, 2], shape=(count - 2, count))
     third = sparse.diags([-ones, 3.0 * ones, -3.0 * ones, ones], [0, 1, 2, 3], shape=(count - 3, count))
-    hessian = sparse.kron(sparse.eye(k), 2.0 * (sparse.eye(count) + WEIGHT * third.T @ third))
+    # of the third difference in mm
+    hessian = sparse.kron(sparse.eye(k), 2.0 * (sparse.eye(count) + 2.0 * third.T @ third))
     normals, share = _normals(k)
     blocks, limits = [], []
     for difference, limit in ((first, 1e-3 * speed * STEP_S), (second, 1e-3 * acceleration * STEP_S**2)):
         blocks.append(sparse.kron(normals, difference))
-        limits.append(np.repeat(MARGIN * limit * share, difference.shape[0]))
+        limits.append(np.repeat(0.98 * limit * share, difference.shape[0]))  # of the bounds: OSQP's accuracy
     start = sparse.kron(sparse.eye(k), sparse.csr_matrix(([1.0], ([0], [0])), shape=(1, count)))
     h, a = (_casadi(matrix) for matrix in (hessian, sparse.vstack([*blocks, start])))
     options: dict[str, Any] = {
@@ -108,7 +103,7 @@ def _program(count: int, k: int, speed: int, acceleration: int) -> _Program:
 
 
 def _normals(k: int) -> tuple[Float, Float]:
-    """Directions (m, k) whose components are bounded, and the share of the limit that each may take (m,)."""
+    """Bounded directions (m, k), and the share of the limit of each (m,)."""
     if k == 1:
         return np.ones((1, 1)), np.ones(1)
     angle = np.arange(SIDES) * np.pi / SIDES

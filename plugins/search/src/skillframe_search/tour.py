@@ -1,10 +1,8 @@
-r"""A search trajectory by sampling (seed, Fig. 16b): places drawn from the distribution, visited in a tour.
+r"""Search trajectory by sampling: places of the exploration distribution, visited in a short tour.
 
-Samples in the order in which they were drawn waste half of the way; a nearest-neighbour tour, improved by 2-opt
-exchanges, visits the same places in a fraction of it. Three things are ours. Samples come in rounds of 60 mm. A sample
-next to the way so far is passed over. And rounds go from the middle outwards: with effort l spent and a width w looked
-at on the way, search theory (Koopman 1957) spends it where the goal is likeliest, here within c standard deviations of
-which the way could just fill the volume,
+Nearest-neighbour order with 2-opt exchanges. Samples come in rounds of 60 mm, without those next to the way so far,
+from the middle outwards: with effort l and a width w seen, search theory (Koopman 1957) searches within c standard
+deviations,
 
     l w^(k-1) v_(k-1) = v_k c^k |S|^(1/2),    1 <= c <= 3.5,    v_k the volume of the unit ball
 """
@@ -19,19 +17,17 @@ import numpy as np
 from skillframe.frames import Float, norm
 from skillframe_search.exploration import CUT, Exploration
 
-ROUND_M = 0.06  # length of a round's tour
 BALL = (1.0, 2.0, np.pi, 4.0 * np.pi / 3.0, 0.5 * np.pi**2, 8.0 * np.pi**2 / 15.0)  # volumes of unit balls
-SEEN_M = 0.0008  # nearer than this to the way so far has been looked at
+SEEN_M = 0.0008  # nearer than this to the way so far is searched
 FINE_M = 0.0004  # between points of the way so far
 MOST_EXCHANGES = 400
-MOST_PLACES = 400  # of a round
 
 
 def tour(exploration: Exploration, length: float, rng: np.random.Generator, seen_m: float = SEEN_M) -> Float:
-    """(n, k) places in the order of the visit [m], from the start (zero) on, at least `length` metres along."""
+    """(n, k) places in the order of the visit [m], from the start (zero), at least `length` metres long."""
     path, travelled = np.zeros((1, len(exploration.mean))), 0.0
     while travelled < length:
-        wanted = min(ROUND_M, length - travelled)
+        wanted = min(0.06, length - travelled)  # length of a round's tour
         cut = reach(exploration, travelled + wanted)
         added = _round(partial(_unseen, exploration, rng, finely(path), seen_m, cut), path[-1], wanted)
         travelled += _length(added, path[-1])
@@ -40,7 +36,7 @@ def tour(exploration: Exploration, length: float, rng: np.random.Generator, seen
 
 
 def reach(exploration: Exploration, length: float) -> float:
-    """The standard deviations within which a way of a length could look everywhere, 1 to 3.5."""
+    """Standard deviations within which a way of a length could search everywhere, 1 to 3.5."""
     k = len(exploration.mean)
     looked = length * SEEN_M ** (k - 1) * BALL[k - 1]
     volume = BALL[k] * float(np.sqrt(np.linalg.det(exploration.spread)))
@@ -50,7 +46,7 @@ def reach(exploration: Exploration, length: float) -> float:
 def _unseen(
     exploration: Exploration, rng: np.random.Generator, seen: Float, seen_m: float, cut: float, count: int
 ) -> Float:
-    """Samples that are not near the way so far, or any where most of it has been searched."""
+    """Samples away from the way so far, or any where most of it has been searched."""
     places = exploration.draw(rng, 4 * count, cut)
     apart = np.sqrt(((places[:, None] - seen[None]) ** 2).sum(axis=2).min(axis=1))
     return np.concatenate([places[apart > seen_m], places[apart <= seen_m]])[:count]
@@ -64,10 +60,9 @@ def finely(path: Float) -> Float:
 
 
 def _round(draw: Callable[[int], Float], here: Float, length: float) -> Float:
-    """One tour of about a length: the number of places grows until their tour is that long."""
     places = draw(8)
     path = shortened(nearest_first(places, here), here)
-    while _length(path, here) < length and len(places) < MOST_PLACES:
+    while _length(path, here) < length and len(places) < 400:  # of a round
         places = np.concatenate([places, draw(max(len(places) // 4, 2))])
         path = shortened(nearest_first(places, here), here)
     return path
@@ -78,7 +73,7 @@ def _length(path: Float, here: Float) -> float:
 
 
 def nearest_first(places: Float, here: Float) -> Float:
-    """The places in the order of always going to the nearest one left."""
+    """The places in order, each time the nearest one left."""
     left, order = np.ones(len(places), dtype=bool), []
     while left.any():
         distance = np.where(left, ((places - here) ** 2).sum(axis=1), np.inf)
@@ -89,12 +84,12 @@ def nearest_first(places: Float, here: Float) -> Float:
 
 
 def shortened(path: Float, here: Float) -> Float:
-    """The path after 2-opt: while some piece is better walked backwards, the best such piece is turned round."""
+    """The path after 2-opt."""
     path = np.vstack([here[None], path])
     for _ in range(MOST_EXCHANGES):
         apart = norm(path[:, None] - path[None])
         step = np.append(apart[np.arange(len(path) - 1), np.arange(1, len(path))], 0.0)
-        # piece i+1 .. j turned round: edges (i, i+1) and (j, j+1) become (i, j) and (i+1, j+1); the end is free
+        # reversing piece i+1 .. j turns edges (i, i+1), (j, j+1) into (i, j), (i+1, j+1); the end is free
         after = np.zeros_like(apart)
         after[:-1, :-1] = apart[1:, 1:]
         gain = step[:, None] + step[None] - apart - after

@@ -1,7 +1,6 @@
-"""Searches tried in the simulated world: blind demonstrations, goals, and the time that each takes to be found.
+"""Simulated searches in MuJoCo: blind demonstrations, goals, and the time to find each.
 
-Everything is MuJoCo. A goal is found when the true tip is 2.5 mm below the true surface, whatever the skill believes;
-all methods get the same goals, and nothing of them but the demonstrations.
+A goal is found when the true tip is 2.5 mm below the true surface.
 """
 
 from __future__ import annotations
@@ -11,9 +10,10 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from skillframe_teaching.blind import CUT, BlindSettings, record_blind
 
 from skillframe.demonstration.record import Demonstration
-from skillframe.document.source import learned
+from skillframe.document.file import learned
 from skillframe.execution.executor import simulate
 from skillframe.execution.prepare import load_robot_model, load_world, prepare
 from skillframe.execution.result import Result
@@ -21,8 +21,6 @@ from skillframe.extend.records import Document, LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import Float
 from skillframe.robot.model import RobotModel
-from skillframe.teaching.blind import CUT, BlindSettings
-from skillframe.teaching.blind_sessions import record_blind
 from skillframe.world.scene import Scene
 
 FOUND_M = 0.0025
@@ -31,7 +29,7 @@ NOBODY_KNEW = (0.0, 0.0, 0.0)
 
 
 class Task(NamedTuple):
-    """What is searched for, and what the demonstrating person believes.
+    """World of a search, and the belief of the blind teacher.
 
     Attributes:
         world: its name.
@@ -47,28 +45,25 @@ class Task(NamedTuple):
 
     @property
     def scene(self) -> Scene:
-        """The world, searched when 2.5 mm deep."""
+        """World whose search ends 2.5 mm deep."""
         return load_world(self.world, {**dict(self.params), "done_depth": FOUND_M})
 
 
 @cache
 def demonstrations(task: Task, count: int = 5, seed: int = 1, time_s: float = 30.0) -> tuple[Demonstration, ...]:
-    """Blind searches of a person who believes in N(centre, believed^2), for so long at most [s]."""
+    """Blind searches of a teacher who believes in N(centre, believed^2), for `time_s` at most [s]."""
     settings = BlindSettings(believed=task.believed, centre=task.centre, time_s=time_s)
     robot = load_robot_model("free_tool")
     return tuple(record_blind(robot, task.scene, settings, count=count, seed=seed).demonstrations)
 
 
-def document(kind: str, task: Task, given: Sequence[Demonstration], **settings: Any) -> Document:
+def document(task: Task, given: Sequence[Demonstration], **settings: Any) -> Document:
     """A search learned at the tip."""
-    return learned(registry().skill(kind), given, LearnOptions(at="tip", settings=settings))
+    return learned(registry().skill("search"), given, LearnOptions(at="tip", settings=settings))
 
 
 def goals(count: int, task: Task, seed: int = 100) -> Float:
-    """(count, 3) where the goal is against the start [m, m, rad].
-
-    Draws of the belief, cut as the person's are, without those so near that there is nothing to search for.
-    """
+    """(count, 3) goals against the start [m, m, rad]: samples of the belief, without those found at once."""
     normal = np.random.default_rng(seed).standard_normal((20 * count, 3))
     where = np.array(task.centre) + normal[np.abs(normal).max(axis=1) < CUT] * np.array(task.believed)
     trivial = (np.hypot(where[:, 0], where[:, 1]) < NEAR_M) & (np.abs(where[:, 2]) < NEAR_RAD)

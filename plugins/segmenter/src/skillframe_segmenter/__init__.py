@@ -1,9 +1,7 @@
-"""skillframe plug-in: the phases of a demonstration, and policies that run them in sequence.
+"""Plug-in that cuts demonstrations into phases, and policies that run the phases in sequence.
 
-Read in this order: `windows` and `features` (what is looked at), `emission` (how a phase moves), `chain`, `transitions`
-and `em` (the model and its fit), `merge` (which phases are one motion), `segmentation` (their flow), `gate` and
-`observer` (which phase it is, online), `policy` (the skill that runs them). This module is all that is imported when
-plug-ins are listed.
+Reading order: `windows`, `features`, `emission`, `chain`, `transitions`, `em` (the model and its fit), `merge`,
+`segmentation` (the flow), `gate`, `observer` (online), `policy` (the skill). Listing plug-ins imports this module only.
 """
 
 from __future__ import annotations
@@ -11,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import partial
 
-from skillframe.extend.hookspecs import hookimpl
+from skillframe import hookimpl
 from skillframe.extend.records import Lazy, SegmenterType, SkillType
 
 skillframe_contract = "0.2"
@@ -19,7 +17,7 @@ skillframe_contract = "0.2"
 
 @hookimpl
 def skillframe_segmenters() -> Iterable[SegmenterType]:
-    """The ways of cutting demonstrations into phases that this plug-in provides."""
+    """The segmenters of this plug-in."""
     segment = Lazy("skillframe_segmenter.segmentation:segment")
     yield SegmenterType(
         name="wrench_hmm", summary="phases with linear motion each; the contact wrench drives the transitions",
@@ -36,7 +34,7 @@ def skillframe_segmenters() -> Iterable[SegmenterType]:
 
 @hookimpl
 def skillframe_skills() -> Iterable[SkillType]:
-    """The kind of skill that this plug-in provides."""
+    """The kind of skill of this plug-in."""
     yield SkillType(
         name="policy",
         summary="phases in sequence, found in whole demonstrations; the contact wrench switches between them",

@@ -1,7 +1,7 @@
-"""Whether demonstrations show one task: they share phases, do not stop half-way, and do not run the other way round.
+"""Check that demonstrations show one task: they share phases, are complete, and have one order.
 
-One stops half-way if it ends in a phase from which all others go on, and has not had the time that they took from there
-to their ends (three quarters of the shortest; ours): robots also differ in how they leave when the task is done.
+One is incomplete if it ends in a phase from which all others go on, in under three quarters of the shortest time that
+they took from there to their ends; leaving after the task may differ.
 """
 
 from __future__ import annotations
@@ -23,26 +23,25 @@ def check_agreement(rows: Sequence[Mapping[str, Any]], demonstrations: Sequence[
         demonstrations: the same, for their names.
 
     Raises:
-        InputError: one that shares no phase with any other, runs the other way round, or stops half-way.
+        InputError: one that shares no phase with any other, runs in reverse, or stops half-way.
     """
     labels = [list(row["labels"]) for row in rows]
     names = [d.source or f"demonstration {i + 1}" for i, d in enumerate(demonstrations)]
     for i, mine in enumerate(labels if len(labels) > 1 else []):
-        _check_order(names[i], mine, [theirs for j, theirs in enumerate(labels) if j != i])
+        name = names[i]
+        others = [theirs for j, theirs in enumerate(labels) if j != i]
+        if not any(set(mine) & set(theirs) for theirs in others):
+            raise InputError(
+                name, f"shares no phase with the other demonstrations (its phases: {_told(mine)})",
+                "leave it out, or segment it with demonstrations of the same task",
+            )  # fmt: skip
+        if all(mine[0] == theirs[-1] and mine[-1] == theirs[0] and mine[0] != mine[-1] for theirs in others):
+            raise InputError(
+                name,
+                f"goes through its phases the other way round ({_told(mine)}) than the others ({_told(others[0])})",
+                "leave it out, or record it again",
+            )  # fmt: skip
         _check_end(names[i], rows[i], [row for j, row in enumerate(rows) if j != i])
-
-
-def _check_order(name: str, mine: list[int], others: Sequence[list[int]]) -> None:
-    if not any(set(mine) & set(theirs) for theirs in others):
-        raise InputError(
-            name, f"shares no phase with the other demonstrations (its phases: {_told(mine)})",
-            "leave it out, or segment it with demonstrations of the same task",
-        )  # fmt: skip
-    if all(mine[0] == theirs[-1] and mine[-1] == theirs[0] and mine[0] != mine[-1] for theirs in others):
-        raise InputError(
-            name, f"goes through its phases the other way round ({_told(mine)}) than the others ({_told(others[0])})",
-            "leave it out, or record it again",
-        )  # fmt: skip
 
 
 def _check_end(name: str, mine: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) -> None:
@@ -58,7 +57,6 @@ def _check_end(name: str, mine: Mapping[str, Any], others: Sequence[Mapping[str,
 
 
 def _time_from(row: Mapping[str, Any], phase: int) -> float:
-    """Seconds from the first time in a phase to the end."""
     first = row["labels"].index(phase)
     return float(row["end"] - [row["start"], *row["boundaries"]][first])
 

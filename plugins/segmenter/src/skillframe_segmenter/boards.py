@@ -1,8 +1,7 @@
-"""From demonstrations that name places to a policy whose phases each belong to a place.
+"""Learn a policy whose phases belong to places, from demonstrations that name places.
 
-What is done at each place is learned from all demonstrations seen from it, as a policy of its own: whether the place
-takes one motion or several is found there. So places of one board are never pooled, and a board that stood elsewhere
-in each demonstration is no noise. Ways in free air are the mean of the demonstrations in the place's frame.
+Each place is a policy learned from all demonstrations in its frame, so that it may take several motions, places of one
+board are never pooled, and a moved board adds no noise. Ways in free air are means in the place's frame.
 """
 
 from __future__ import annotations
@@ -12,9 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from skillframe.demonstration.places import KEY, as_plain, places_of, seen_from
 from skillframe.demonstration.record import Demonstration
-from skillframe.document.frame import frame_of
+from skillframe.document.frame import PLACES, as_plain, frame_of, places_of, seen_from
 from skillframe.errors import InputError
 from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Pose, norm
@@ -34,14 +32,14 @@ def names_places(demonstrations: Sequence[Demonstration]) -> bool:
 def learn_places(
     demonstrations: Sequence[Demonstration], options: LearnOptions, recoveries: int, moved: bool, learn: LearnPlace
 ) -> Document:  # fmt: skip
-    """The body of a policy whose phases belong to places.
+    """Body of a policy whose phases belong to places.
 
     Args:
         demonstrations: all naming places.
         options: handed to the learner of each place.
         recoveries: of the whole.
-        moved: a person has asked for boundaries to be moved, which here are between places.
-        learn: learns what is done at a place, from demonstrations in its frame.
+        moved: boundaries were moved by the user.
+        learn: learns one place, from demonstrations in its frame.
 
     Raises:
         InputError: demonstrations that do not agree on places, or one that cannot be learned from.
@@ -62,7 +60,7 @@ def learn_places(
         "frame": frame_of(demonstrations, options),
         "phases": phases,
         "recoveries": recoveries,
-        KEY: as_plain({name: frames[0][name] for name in sorted(used)}),
+        PLACES: as_plain({name: frames[0][name] for name in sorted(used)}),
         "phase_model": {"type": "places", "successors": np.eye(count, count + 1, 1).tolist()},
         "demonstrations": [_row(d, each) for d, each in zip(demonstrations, visits, strict=True)],
     }
@@ -90,7 +88,6 @@ def _pose(demonstration: Demonstration, time: float) -> Pose:
 
 
 def _mean(poses: Sequence[Pose]) -> Pose:
-    """Mean position, and the rotation nearest to the mean of rotation matrices."""
     left, _, right = np.linalg.svd(np.mean([pose.rotation for pose in poses], axis=0))
     rotation = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
     return Pose(np.mean([pose.position for pose in poses], axis=0), rotation)
@@ -101,7 +98,7 @@ def _plain(poses: Sequence[Pose]) -> list[dict[str, list[float]]]:
 
 
 def _speed(demonstrations: Sequence[Demonstration], visits: Sequence[Sequence[Visit]]) -> float:
-    """Median speed between places [m/s], within what an arm can do carefully."""
+    """Median speed between places [m/s], within limits."""
     speeds: list[float] = []
     for d, mine in zip(demonstrations, visits, strict=True):
         path = path_of(d)
@@ -114,7 +111,7 @@ def _speed(demonstrations: Sequence[Demonstration], visits: Sequence[Sequence[Vi
 
 
 def _row(demonstration: Demonstration, visits: Sequence[Visit]) -> Document:
-    """A row of `demonstrations`: boundaries where the tool has left a place."""
+    """A row of `demonstrations`, with boundaries where the tool leaves a place."""
     return {
         "file": demonstration.source, "start": float(demonstration.time[0]), "end": float(demonstration.time[-1]),
         "boundaries": [(v.out or (v.leaves,))[-1] for v in visits[:-1]], "labels": list(range(len(visits))),

@@ -1,4 +1,4 @@
-"""Boundaries that a person moves: "2:1=3.45" puts the first boundary of the second demonstration at 3.45 s."""
+"""Boundaries moved by the user: "2:1=3.45" puts the first boundary of the second demonstration at 3.45 s."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ ROUNDING_S = 1e-6
 
 
 class Move(NamedTuple):
-    """Demonstration and boundary, counted from 0, and where the boundary is to be [s]."""
+    """Demonstration and boundary, counted from 0, and the new time [s]."""
 
     demonstration: int
     boundary: int
@@ -25,10 +25,11 @@ class Move(NamedTuple):
 
 
 def parse_move(text: str, names: Sequence[str]) -> Move:
-    """A move out of "DEMONSTRATION:BOUNDARY=SECONDS". The demonstration is a number (from 1) or a file name.
+    """A move from "DEMONSTRATION:BOUNDARY=SECONDS", the demonstration a number (from 1) or file name.
 
     Raises:
-        InputError: not of that form, or not a time. UnknownName: no such demonstration.
+        InputError: not of that form, or not a time.
+        UnknownName: no such demonstration.
     """
     head, equals, seconds = text.rpartition("=")
     name, colon, number = head.rpartition(":")
@@ -49,11 +50,11 @@ def moved(rows: Sequence[Document], moves: Sequence[Move], names: Sequence[str])
     """Rows of `demonstrations` with boundaries moved.
 
     Returns:
-        the rows. Each also holds `found`, its `boundaries` and `labels` as they stood, and one that a person has moved
-        something in holds `set`, the numbers of the boundaries moved.
+        the rows, each with `found`, its `boundaries` and `labels` before, and changed ones with `set`, the numbers of
+            the moved boundaries.
 
     Raises:
-        InputError: a boundary that is not there, a place outside its neighbours, or too short a phase.
+        InputError: a missing boundary, a time outside its neighbours, or too short a phase.
     """
     result = [
         {**row, "boundaries": list(row["boundaries"]), "found": {key: row[key] for key in ("boundaries", "labels")}}
@@ -85,7 +86,6 @@ def _check_order(row: Document, move: Move, names: Sequence[str]) -> None:
 
 
 def _check_length(row: Document, move: Move, names: Sequence[str]) -> None:
-    """Whether both phases that a moved boundary parts last long enough."""
     edges = [row["start"], *row["boundaries"], row["end"]]
     before, here, after = edges[move.boundary : move.boundary + 3]
     shortest = min(here - before, after - here)

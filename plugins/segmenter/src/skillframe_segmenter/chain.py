@@ -1,13 +1,10 @@
-r"""Forward and backward probabilities of a Markov chain whose transitions change from step to step, in blocks.
+r"""Forward and backward probabilities of a Markov chain with time-dependent transitions, in blocks.
 
     alpha_t = alpha_{t-1} A_t,    beta_{t-1} = A_t beta_t,    A_t(i, j) = P_t(i, j) b_t(j)
 
-A loop over T windows is what makes such a model slow in Python. The products of the K x K matrices A_t are therefore
-taken in about sqrt(T) blocks side by side, all demonstrations and both directions at once (the backward pass is the
-forward pass of the reversed chain): prefix products inside every block, then one vector handed from block to block.
-Products are rescaled as they shrink, so that nothing underflows. The most likely path is the same with sums of logs for
-products and maxima for sums. The results are those of the loop to rounding. Inside, time is the last axis: K is small,
-and numpy is fast along a long one.
+Products of the K x K matrices A_t are taken in about sqrt(T) blocks, for all demonstrations and both directions at
+once, instead of a slow loop; a vector passes between blocks. Rescaling prevents underflow. The most likely path takes
+sums of logs and maxima. Time is the last axis inside, where numpy is fast.
 """
 
 from __future__ import annotations
@@ -21,11 +18,11 @@ from numpy.typing import NDArray
 from skillframe.frames import Float
 
 TINY = 1e-300
-EVERY = 8  # products between two rescalings: a step shrinks by 1e-13 at most in practice, and doubles reach 1e-308
+EVERY = 8  # products between two rescalings: a step shrinks by 1e-13 at most in practice, doubles reach 1e-308
 
 
 class Smoothed(NamedTuple):
-    """Probabilities over whole demonstrations: B demonstrations, T windows, K phases.
+    """Probabilities of B demonstrations, T windows, K phases.
 
     Attributes:
         posterior: (B, T, K) p(phase at t | all windows).
@@ -45,8 +42,8 @@ def smooth(initial: Float, emission: Float, transition: Float) -> Smoothed:
 
     Args:
         initial: (K,) probabilities of the first window.
-        emission: (B, T, K) log densities; 0 in windows that only fill up a shorter demonstration.
-        transition: (B, T - 1, K, K); identity into windows that only fill up.
+        emission: (B, T, K) log densities; 0 in padding windows.
+        transition: (B, T - 1, K, K); identity into padding windows.
     """
     batch, _, k = emission.shape
     density, highest = _densities(emission)
@@ -65,7 +62,7 @@ def smooth(initial: Float, emission: Float, transition: Float) -> Smoothed:
 
 
 def _time_last(x: Float) -> Float:
-    """(B, T, ...) with time and demonstrations moved to the end: (..., B, T)."""
+    """(..., B, T) from (B, T, ...)."""
     return np.ascontiguousarray(np.moveaxis(x, (0, 1), (-2, -1)))
 
 
@@ -77,7 +74,7 @@ def _densities(emission: Float) -> tuple[Float, Float]:
 
 
 def _blocks(steps: Float, neutral: Float) -> Float:
-    """(L, K, K, B, n): steps (K, K, B, T) in n blocks side by side, filled up with neutral steps (K, K)."""
+    """(L, K, K, B, n) steps (K, K, B, T) in n blocks, padded with neutral steps (K, K)."""
     k, _, batch, count = steps.shape
     length = max(1, int(np.ceil(np.sqrt(count))))
     blocks = max(1, -(-count // length))
@@ -87,7 +84,7 @@ def _blocks(steps: Float, neutral: Float) -> Float:
 
 
 def _product(a: Float, b: Float) -> Float:
-    """Matrix product over the first two axes (K, K, B, n) of both, all others side by side."""
+    """Matrix product over the first two axes (K, K, B, n)."""
     result: Float = a[:, 0, None] * b[None, 0]
     for j in range(1, len(b)):
         result += a[:, j, None] * b[None, j]
@@ -95,7 +92,6 @@ def _product(a: Float, b: Float) -> Float:
 
 
 def _best(a: Float, b: Float) -> Float:
-    """The same with sums for products and maxima for sums."""
     result: Float = a[:, 0, None] + b[None, 0]
     for j in range(1, len(b)):
         np.maximum(result, a[:, j, None] + b[None, j], out=result)
@@ -103,14 +99,14 @@ def _best(a: Float, b: Float) -> Float:
 
 
 def _applied(starts: Float, blocks: Float, apply: Callable[[Float, Float], Float], count: int) -> Float:
-    """(K, B, count) what vectors (K, B, n) at the starts of blocks become inside them, whose steps are `count`."""
+    """(K, B, count) vectors inside blocks of `count` steps, from (K, B, n) at their starts."""
     inside = apply(starts[None, ..., None], np.moveaxis(blocks, 0, -1))[0]
     result: Float = inside.reshape(*inside.shape[:2], -1)[..., :count]
     return result
 
 
 def _passed(first: Float, steps: Float) -> tuple[Float, Float]:
-    """Normalised vectors (K, B, T + 1) that start as `first` (K, B), and the log of what was divided out (B,)."""
+    """Normalised vectors (K, B, T + 1) from `first` (K, B), and the log of their divisors (B,)."""
     blocks = _blocks(steps, np.eye(len(first)))
     length, _, _, batch, count = blocks.shape
     log_scale = np.zeros((batch, count))
@@ -128,7 +124,7 @@ def _passed(first: Float, steps: Float) -> tuple[Float, Float]:
 
 
 def _handed(first: Float, across: Float) -> tuple[Float, Float]:
-    """Vectors (K, B, n) at the starts of blocks that they cross by (K, K, B, n), and logs of the divisors (B,)."""
+    """Vectors (K, B, n) at the starts of blocks with products (K, K, B, n), and logs of the divisors (B,)."""
     matrices = np.ascontiguousarray(across.transpose(3, 2, 0, 1))
     carry = np.ascontiguousarray(first.T)[:, None]
     starts = np.empty((len(matrices), *carry.shape))

@@ -1,11 +1,10 @@
-r"""Where a demonstration changes, before any model: the cuts of least cost, and their segments in K groups.
+r"""Change points of a demonstration: the cuts of least cost, and their segments in K groups.
 
     min over cuts of  sum over segments sum |x - mean|^2  +  penalty per cut
 
-by dynamic programming (Jackson et al. 2005; exact), on [u, a/2], segments of at least four windows, with the penalty
-6 max(s^2, 0.02) ln n and s^2 the median variance within eight windows (ours). A demonstration longer than 400 windows
-is looked at in groups of several. The means of all segments are then put into K groups (Lloyd's k-means, weighted by
-length, started at the means farthest apart): one of the two places that the phase model starts from.
+by dynamic programming (Jackson et al. 2005; exact), on [u, a/2], segments of at least four windows, with the penalty 6
+max(s^2, 0.02) ln n and s^2 the median variance within eight windows. Windows are grouped beyond 400. K-means (Lloyd,
+weighted by length, started at the farthest means) then groups the segments, one of the two starts of the phase model.
 """
 
 from __future__ import annotations
@@ -23,17 +22,18 @@ Labels = NDArray[np.intp]
 
 
 def cuts(x: Float) -> list[int]:
-    """Inner cuts of a signal (T, n), in increasing order."""
+    """Inner cuts of a signal (T, n), increasing."""
     group = -(-len(x) // MOST)
     if group > 1:
         whole = len(x) // group
         return [group * c for c in cuts(x[: whole * group].reshape(whole, group, -1).mean(axis=1))]
     if len(x) < 2 * SHORTEST:
         return []
-    return _least_cost(x, 6.0 * max(_local_variance(x), 0.02) * np.log(len(x)))
+    return _least_cost(x, 6.0 * max(local_variance(x), 0.02) * np.log(len(x)))
 
 
-def _local_variance(x: Float, width: int = 8) -> float:
+def local_variance(x: Float, width: int = 8) -> float:
+    """Median variance of rows (T, d) over stretches of `width`."""
     if len(x) < width:
         return float(x.var(axis=0).sum())
     sums, squares = _cumulated(x)
@@ -42,7 +42,6 @@ def _local_variance(x: Float, width: int = 8) -> float:
 
 
 def _cumulated(x: Float) -> tuple[Float, Float]:
-    """Running sums (T + 1, n) of x and (T + 1,) of |x|^2."""
     sums = np.concatenate([np.zeros((1, x.shape[1])), np.cumsum(x, axis=0)])
     return sums, np.concatenate([[0.0], np.cumsum((x * x).sum(axis=1))])
 
@@ -74,14 +73,14 @@ def _costs(x: Float) -> Float:
 
 
 class Segments(NamedTuple):
-    """All segments of all demonstrations: how many windows (S,) each has, and their mean (S, n)."""
+    """Windows (S,) and means (S, n) of all segments."""
 
     sizes: NDArray[np.intp]
     means: Float
 
 
 def segments(signals: Sequence[Float]) -> Segments:
-    """The segments of signals (T, n), one after the other. A signal without windows has none."""
+    """Segments of signals (T, n), one after the other."""
     some = [x for x in signals if len(x)]
     bounds = [np.array([0, *cuts(x), len(x)]) for x in some]
     sizes = np.concatenate([np.diff(b) for b in bounds])
@@ -90,7 +89,7 @@ def segments(signals: Sequence[Float]) -> Segments:
 
 
 def grouped(found: Segments, phases: int) -> Labels | None:
-    """Labels of every window from K groups of segments, or None if there are fewer segments than groups."""
+    """Labels of every window from K groups of segments, or None with fewer segments than groups."""
     if len(found.sizes) < phases:
         return None
     return np.repeat(_k_means(found.means, found.sizes.astype(float), phases), found.sizes)

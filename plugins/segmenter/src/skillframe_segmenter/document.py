@@ -1,4 +1,4 @@
-"""A policy's part of the skill file: `phases`, each with the kind of its skill, and the `phase_model`."""
+"""Policy part of the skill file: `phases`, each with its kind of skill, and the `phase_model`."""
 
 from __future__ import annotations
 
@@ -22,13 +22,12 @@ SHARED = ("phases", "phase_model", "demonstrations", "type", "type_version", "re
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PolicyDocument:
-    """A policy, read and checked.
+    """A checked policy.
 
     Attributes:
         skills: a whole skill document for each phase.
         model: to follow the phases online; None where phases end by themselves only.
-        successors: (P, P + 1) how often each phase was followed by each; the last column is the end. What came after
-            the phase in which most demonstrations ended does not count, see `to_the_common_end`.
+        successors: (P, P + 1) counts of successions, the last column the end, see `to_the_common_end`.
         recoveries: failures of a phase that are recovered from.
     """
 
@@ -42,7 +41,7 @@ def read(document: Document) -> PolicyDocument:
     """The policy of a document.
 
     Raises:
-        InputError: phases and phase model do not match, or a key that is missing or holds the wrong thing.
+        InputError: phases and phase model do not match, or a key that is missing or has a wrong value.
         UnknownName: a phase's kind of skill is not installed.
     """
     phases = document.get("phases", [])
@@ -51,8 +50,20 @@ def read(document: Document) -> PolicyDocument:
     model = _get(document, "phase_model", dict[str, Any])
     followed = from_document(model) if _get(model, "type", str, "phase_model.") in FOLLOWED else None
     successors = np.array(coerce(model.get("successors"), list[list[float]], "phase_model.successors"))
-    _match(len(phases), successors)
-    successors = to_the_common_end(successors, _labels(document, len(phases)))
+    if successors.shape != (len(phases), len(phases) + 1):
+        raise InputError(
+            "phase_model", f"knows {len(successors)} phases, but the file holds {len(phases)}",
+            "its phases were edited by hand or mixed up; segment the demonstrations again",
+        )  # fmt: skip
+    rows = coerce(document.get("demonstrations", []), list[dict[str, Any]], "demonstrations")
+    labels = [coerce(row.get("labels", []), list[int], f"demonstrations[{i}].labels") for i, row in enumerate(rows)]
+    for i, each in enumerate(labels):
+        if any(not 0 <= label < len(phases) for label in each):
+            raise InputError(
+                f"demonstrations[{i}].labels", f"names a phase beyond the {len(phases)} that the file holds",
+                "segment the demonstrations again",
+            )  # fmt: skip
+    successors = to_the_common_end(successors, labels)
     recoveries = _get(document, "recoveries", int)
     if recoveries < 0:
         raise InputError("recoveries", "should not be negative", "0 takes the first failure")
@@ -66,11 +77,10 @@ def read(document: Document) -> PolicyDocument:
 
 
 def to_the_common_end(successors: Float, labels: Sequence[Sequence[int]]) -> Float:
-    """How often each phase was followed by each, had no demonstration gone on from where most of them ended.
+    """Successions without those after the common end.
 
-    A hand that lingers, lets go or is already on its way out may add a phase, or come back to one, after the work is
-    done. If more than half of the demonstrations ended in one phase, a run that has ended it has done the work, and
-    must not go on because one demonstration did. Ways before that are all kept, however few took them. Our choice.
+    If more than half of the demonstrations ended in one phase, the task is done there; a teacher who lingers or leaves
+    may add phases, which a run must not repeat. All ways before that are kept.
 
     Args:
         successors: (P, P + 1) counts, the last column the end.
@@ -91,7 +101,7 @@ def to_the_common_end(successors: Float, labels: Sequence[Sequence[int]]) -> Flo
 
 
 def check(document: Document) -> None:
-    """Raise `InputError` if a policy's document is not as it should be, its phases' skills included."""
+    """Raise `InputError` if a policy's document or a skill of its phases is invalid."""
     for i, sub in enumerate(read(document).skills):
         kind = registry().skill(sub["type"])
         if kind.check is not None:
@@ -112,28 +122,6 @@ def skill_of(document: Document, index: int) -> Document:
     own = {k: v for k, v in phase.items() if k not in ("skill", "beside")}
     return {**shared, **coerce(phase.get("beside", {}), dict[str, Any], f"phases[{index}].beside"), "type": kind,
             "phases": [own]}  # fmt: skip
-
-
-def _labels(document: Document, phases: int) -> list[list[int]]:
-    """Phases of each demonstration in order."""
-    rows = coerce(document.get("demonstrations", []), list[dict[str, Any]], "demonstrations")
-    labels = [coerce(row.get("labels", []), list[int], f"demonstrations[{i}].labels") for i, row in enumerate(rows)]
-    for i, each in enumerate(labels):
-        if any(not 0 <= label < phases for label in each):
-            raise InputError(
-                f"demonstrations[{i}].labels", f"names a phase beyond the {phases} that the file holds",
-                "segment the demonstrations again",
-            )  # fmt: skip
-    return labels
-
-
-def _match(phases: int, successors: Float) -> None:
-    if successors.shape != (phases, phases + 1):
-        known = len(successors)
-        raise InputError(
-            "phase_model", f"knows {known} phases, but the file holds {phases}",
-            "its phases were edited by hand or mixed up; segment the demonstrations again",
-        )  # fmt: skip
 
 
 def _get(values: Document, key: str, hint: Any, where: str = "") -> Any:

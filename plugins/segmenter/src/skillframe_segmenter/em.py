@@ -1,15 +1,14 @@
-r"""Expectation maximisation over several demonstrations of unequal length, and how many phases there are.
+r"""Expectation maximisation over demonstrations of unequal length, and the number of phases.
 
-Windows are correlated, so the emission is tempered, in the E-step and in the criterion alike:
+Windows are correlated, so the emission is tempered in the E-step and the criterion, or phases would be found in the
+noise of long recordings:
 
     eta = 0.3 clip(100 / mean windows per demonstration, 0.1, 1)          a demonstration counts as ~30 samples
     BIC = -2 L_eta + p ln(eta N),       p = K (2 m + m (m - 1) / 8) + K (K - 1)
 
-Without it a criterion finds phases in the noise of a long recording. Each number of phases starts twice, from equal
-shares of time and from groups of change points; the start that ends at the better likelihood is kept. Transitions stay
-at their prior until the motion has converged and are then fitted to the wrench in three rounds. Windows that go round
-(see `rounds`) belong to the last phase, and it to them; the others are fitted as if it were not there. The papers fit
-such a model by EM and give no constants; all of these are ours.
+Each number of phases starts from equal shares of time and from change points, and the better likelihood is kept.
+Transitions stay at their prior until the motion has converged, then are fitted to the wrench in three rounds. Windows
+that go round (see `rounds`) belong to the last phase only. The papers give no constants.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ from skillframe_segmenter.settings import Settings
 
 MOST_ROUNDS, CLOSE, WRENCH_ROUNDS = 60, 1e-4, 3
 LEAK = 0.05
-NEVER = -1e3  # log density of a phase that a person has ruled out for a window
+NEVER = -1e3  # log density of a phase that the user excluded for a window
 Scalar = TypeVar("Scalar", bound=np.generic)
 
 
@@ -39,7 +38,7 @@ class Model:
     """K phases in a chain.
 
     Attributes:
-        phases: how each moves.
+        phases: motion of each.
         initial: (K,) probabilities at the start.
         weights: (K, K, R) of the transitions.
         temper: eta.
@@ -57,16 +56,15 @@ class Model:
 
 
 class Data(NamedTuple):
-    """All demonstrations, end to end, with W windows in all.
+    """All demonstrations, end to end, W windows in all.
 
     Attributes:
         seen: motions and contacts.
-        regressors: (W, R) what drives the transitions.
-        inside: (B, T) which windows of the longest demonstration's length each has.
+        regressors: (W, R) of the transitions.
+        inside: (B, T) windows of each within the longest length.
         temper: eta.
-        going: (W,) windows of the phase that goes round, which is the last; None if there is no such phase.
-        ruled: (W, K) added to log densities: `NEVER` where a person has said that a window is of another phase; None
-            if nobody has said anything.
+        going: (W,) windows of the phase that goes round, the last; None without one.
+        ruled: (W, K) added to log densities: `NEVER` where the user set another phase, or None.
     """
 
     seen: Observed
@@ -92,14 +90,14 @@ class Data(NamedTuple):
 
 
 class Expected(NamedTuple):
-    """What a model makes of the data: its probabilities, and the log densities (B, T, K) that they are from."""
+    """Probabilities, and the log densities (B, T, K) that they are from."""
 
     smoothed: chain.Smoothed
     densities: Float
 
 
 class Fit(NamedTuple):
-    """A fitted model, the posterior (W, K) of its phases, its tempered log-likelihood and criterion, and its E-step."""
+    """A fitted model, the posterior (W, K), tempered log-likelihood, criterion and E-step."""
 
     model: Model
     posterior: Float
@@ -112,7 +110,7 @@ def gather(
     demonstrations: Sequence[Features], regressors: Sequence[Float], settings: Settings,
     going: Sequence[NDArray[np.bool_]] | None = None,
 ) -> Data:  # fmt: skip
-    """Demonstrations as one body of data. `going` are the windows of each that go round, if that is a phase."""
+    """Demonstrations as one set of data, with the windows `going` round, if that is a phase."""
     lengths = np.array([len(d.motion) for d in demonstrations])
     seen = emission.observe(
         np.concatenate([d.motion for d in demonstrations]), np.concatenate([d.contact for d in demonstrations])
@@ -124,31 +122,32 @@ def gather(
 
 
 def best(data: Data, segments: Segments, phases: int, settings: Settings) -> Fit:
-    """The better of the two starts for a number of phases, motion only. `segments` are of what does not go round."""
+    """The better of the two starts for a number of phases, motion only. `segments` exclude what goes round."""
     straight = data.straight
     others = phases - (data.going is not None)
-    starts = [_by_time([int(x.sum()) for x in data.split(straight)], others)]
+    starts = [by_time([int(x.sum()) for x in data.split(straight)], others)]
     found = changepoints.grouped(segments, others)
     if found is not None and others > 1:
         starts.append(found)
     if data.going is not None:
         starts = [_placed(x, straight, phases - 1) for x in starts]
-    return max((converge(data, _leaky(x, phases), settings) for x in starts), key=lambda fit: fit.log_likelihood)
+    return max((converge(data, leaky(x, phases), settings) for x in starts), key=lambda fit: fit.log_likelihood)
 
 
-def _leaky(labels: NDArray[np.intp], phases: int) -> Float:
-    """Responsibilities (W, K) of hard labels, with a little for the others."""
+def by_time(lengths: Sequence[int], phases: int) -> NDArray[np.intp]:
+    """Labels that cut every demonstration into equal stretches."""
+    return np.concatenate([(np.arange(n) * phases) // max(n, 1) for n in lengths])
+
+
+def leaky(labels: NDArray[np.intp], phases: int) -> Float:
+    """Responsibilities (W, K) of hard labels, with `LEAK` for the others."""
     posterior = np.full((len(labels), phases), LEAK / phases)
     posterior[np.arange(len(labels)), labels] += 1.0 - LEAK
     return posterior
 
 
-def _by_time(lengths: Sequence[int], phases: int) -> NDArray[np.intp]:
-    return np.concatenate([(np.arange(n) * phases) // max(n, 1) for n in lengths])
-
-
 def _placed(labels: NDArray[np.intp], where: NDArray[np.bool_], other: int) -> NDArray[np.intp]:
-    """Labels of some windows among all, the rest labelled `other`."""
+    """Labels of some windows among all, the rest `other`."""
     result = np.full(len(where), other, dtype=np.intp)
     result[where] = labels
     return result
@@ -172,7 +171,7 @@ def converge(data: Data, posterior: Float, settings: Settings) -> Fit:
 
 
 def with_transitions(data: Data, fit: Fit, settings: Settings) -> Fit:
-    """The fit after rounds in which the transitions are fitted as well."""
+    """The fit after the rounds that fit transitions."""
     model, prior = fit.model, transitions.prior_weights(fit.model.count, data.regressors.shape[1], settings.stay_s)
     posterior, log_likelihood = fit.posterior, fit.log_likelihood
     if model.count == 1:
@@ -193,7 +192,7 @@ def with_transitions(data: Data, fit: Fit, settings: Settings) -> Fit:
 
 
 def log_densities(data: Data, model: Model, residual: Float | None = None) -> Float:
-    """(W, K) tempered log densities, with what a person has ruled out. Residuals are those of `emission.fitted`."""
+    """(W, K) tempered log densities with the user's exclusions, from residuals of `emission.fitted`."""
     result = model.temper * emission.log_likelihood(data.seen, model.phases, residual)
     if data.going is not None:
         result += NEVER * (data.going[:, None] != (np.arange(model.count) == model.count - 1))
@@ -201,7 +200,7 @@ def log_densities(data: Data, model: Model, residual: Float | None = None) -> Fl
 
 
 def _maximise(data: Data, posterior: Float, weights: Float) -> tuple[Model, Float]:
-    """The model of responsibilities (W, K), and what its phases leave of the motions (K, 6, W)."""
+    """Model of responsibilities (W, K), and residual motions (K, 6, W)."""
     k = posterior.shape[1]
     firsts = posterior[np.concatenate([[0], np.cumsum(data.lengths)[:-1]])]
     initial = 0.5 / k + 0.5 * firsts.mean(axis=0)
@@ -210,7 +209,7 @@ def _maximise(data: Data, posterior: Float, weights: Float) -> tuple[Model, Floa
 
 
 def _moving(data: Data, posterior: Float) -> tuple[Phases, Float]:
-    """How the phases move. The covariance of one that goes round is no measure for the others."""
+    """Motion of the phases, where one that goes round does not share its covariance."""
     if data.going is None:
         return emission.fitted(data.seen, posterior)
     parts = [emission.fitted(data.seen, mine) for mine in (posterior[:, :-1], posterior[:, -1:])]
@@ -226,7 +225,7 @@ def _expect(data: Data, model: Model, steps: Float, residual: Float) -> Expected
 
 
 def _steps(data: Data, probabilities: Float) -> Float:
-    """(B, T - 1, K, K) transitions into windows, from one row per window. The identity where there is no window."""
+    """(B, T - 1, K, K) transitions into windows, from one row per window, the identity in padding."""
     k = probabilities.shape[-1]
     result = np.empty((k, k, *data.inside.shape))
     result[...] = np.eye(k)[:, :, None, None]
@@ -243,7 +242,7 @@ def _fit(data: Data, model: Model, posterior: Float, log_likelihood: float, expe
 
 
 def paths(data: Data, model: Model) -> list[NDArray[np.intp]]:
-    """The most likely path of every demonstration."""
+    """Most likely path of every demonstration."""
     densities = data.split(log_densities(data, model))
     steps = data.split(transitions.probabilities(model.weights, data.regressors))
     return [

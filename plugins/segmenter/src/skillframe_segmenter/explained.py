@@ -1,20 +1,12 @@
-r"""How much the phases explain, against chance.
+r"""Share of motion and force that the phases explain, against chance.
 
-A phase that is one thing moves and feels in one recording as it does in the others. With x the features of the windows
-(`features`: directions of motion and of contact) and m_k the mean over the windows of phase k in the *other* ones,
+With x the features of the windows (`features`) and m_k the mean over the windows of phase k in the *other* recordings,
 
     share = 1 - sum |x_t - m_{k(t)}|^2 / sum |x_t - m|^2
 
-over all windows, m being the mean over all phases of the other recordings. 1: phases say everything; 0: nothing; below
-0: they mislead. Of one recording its own windows stand in for the others', which flatters: it is said so.
-
-Chance is the same share with each recording's labels turned round in time, by an amount of its own drawn evenly
-(`SHIFTS` times, from one seed): as many phases, as long, in the same order, at other times. p counts how often chance
-is as good, (1 + as good) / (1 + SHIFTS). The phases were found in these very recordings, so a small p says that the
-cuts lie where something changes, not that a fresh recording would be cut so.
-
-`touches` says the same of contact, which every task shows: of the moments at which the audit sees contact begin or end,
-how many lie within `WITHIN_S` of a cut, and how many of the turned cuts do in the mean. All of this is ours.
+over all windows, m being the mean over all phases of the others; below 0 they mislead. A single recording is judged by
+itself, which flatters. Chance is the share with labels shifted cyclically in time, `SHIFTS` times; p = (1 + as good) /
+(1 + SHIFTS). As phases were found in these recordings, a small p does not hold for new ones.
 """
 
 from __future__ import annotations
@@ -25,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.conditioning.audit import audit
+from skillframe.demonstration.contact import contact_evidence
 from skillframe.demonstration.record import Demonstration
 from skillframe.frames import Float
 from skillframe_segmenter.features import features, scales
@@ -33,6 +25,7 @@ from skillframe_segmenter.settings import WINDOW_S
 from skillframe_segmenter.windows import Windows, cut_all
 
 SHIFTS, WITHIN_S = 199, 0.25
+CERTAIN = 0.05  # p above which phases are no better than chance
 MANY = 4  # changes of contact in a recording that one phase does not explain
 Labels = NDArray[np.intp]
 
@@ -40,12 +33,12 @@ Labels = NDArray[np.intp]
 def explained(
     rows: Sequence[Mapping[str, Any]], demonstrations: Sequence[Demonstration], at: str | None, axes: str
 ) -> dict[str, Any]:
-    """What is written down as `explained`: share, chance and p of phases, and the touches at cuts.
+    """The entry `explained`: share, chance and p of phases, and the touches at cuts.
 
     Args:
         rows: `demonstrations` of a segmentation.
         demonstrations: the same.
-        at: point of the tool that was looked at.
+        at: observed point of the tool.
         axes: "base" or "phase_start".
     """
     cut, _ = cut_all(demonstrations, at, axes)
@@ -63,7 +56,7 @@ def explained(
 
 
 def share_of(seen: Sequence[Float], labels: Sequence[Labels]) -> float:
-    """The share that phases explain of features (W, F), each recording judged by the others.
+    """Share that phases explain of features (W, F), each recording judged by the others.
 
     Args:
         seen: by recording.
@@ -92,8 +85,8 @@ def _labels(row: Mapping[str, Any], cut: Windows) -> Labels:
 def _touches(
     rows: Sequence[Mapping[str, Any]], demonstrations: Sequence[Demonstration], turns: Sequence[Sequence[int]]
 ) -> dict[str, Any]:
-    """How many changes of contact there are, how many lie near a cut, and near turned cuts in the mean."""
-    moments = [np.array([t for c in audit(d).contacts for t in c[:2]]) for d in demonstrations]
+    """Counts of contact changes: all, near a cut, and near shifted cuts on average."""
+    moments = [np.array([t for c in contact_evidence(d).contacts for t in c[:2]]) for d in demonstrations]
     inner = [
         m[(m > row["start"] + WITHIN_S) & (m < row["end"] - WITHIN_S)] for m, row in zip(moments, rows, strict=True)
     ]
@@ -111,19 +104,19 @@ def _touches(
 
 
 def near_cuts(moments: Float, cuts: Float) -> int:
-    """How many moments lie within `WITHIN_S` of a cut."""
+    """Number of moments within `WITHIN_S` of a cut."""
     if not len(cuts):
         return 0
     return int((np.abs(moments[:, None] - cuts).min(axis=1, initial=np.inf) <= WITHIN_S).sum())
 
 
 def words(found: Mapping[str, Any]) -> list[str]:
-    """The score in words, a line for phases and one for contact."""
+    """The lines for phases and contact."""
     alone = " (of one recording by itself, which flatters)" if found["recordings"] == 1 else ""
-    verdict = "" if found["p"] <= 0.05 else "; no better than chance: look at the cuts"
+    verdict = "" if found["p"] <= CERTAIN else "; no better than chance: check the cuts"
     lines = [
-        f"phases explain {_percent(found['share'])} of how the tool moved and felt{alone}; turned round in time "
-        f"{_percent(found['chance'])} (p = {found['p']:.2g}, {found['shifts']} shifts){verdict}"
+        f"phases explain {_percent(found['share'])} of motion and force{alone}, against "
+        f"{_percent(found['chance'])} for time-shifted data (p = {found['p']:.2g}, {found['shifts']} shifts){verdict}"
     ]
     touches = found["touches"]
     if not found["cuts"]:
@@ -138,7 +131,6 @@ def words(found: Mapping[str, Any]) -> list[str]:
 
 
 def _percent(share: float) -> str:
-    """In whole percent, a share that rounds to nothing without a sign."""
     return f"{round(100.0 * share)}%"
 
 

@@ -1,11 +1,10 @@
-r"""What a phase model sees: directions of motion and of contact, each softly normalised to length below one.
+r"""Features of a phase model: directions of motion and contact, softly normalised to length below one.
 
     soft(x, x0) = x / sqrt(|x|^2 + x0^2)
     u = [soft(v, v_r / 4), soft(w, w_r / 4)]      a = [soft(F, F_0), soft(T, T_0)]      phi = [a, |a_F|, |a_T|, 1]
 
-An LMC is a direction, not a speed, and a contact is a direction of force, not its size; standing still and free air are
-near zero instead of random unit vectors. Plain increments and standardised wrenches decide for or against a model more
-than its form does (our finding; the scales are ours):
+An LMC is a direction, not a speed, and a contact a direction of force, not its size; rest and free air are near zero
+instead of random unit vectors. The scales are
 
     v_r = max(P80 |v|, 1 mm/s),    w_r = max(P80 |w|, P80 |v| / 0.2 m, 1 deg/s)             per demonstration
     F_0 = max(0.2 P90 |F|, 1.5 s_F),    T_0 = max(0.2 P90 |T|, 1.5 s_T, F_0 10 mm)          over all of them
@@ -28,7 +27,7 @@ LEVER_M, ARM_M = 0.2, 0.01
 
 
 class Scales(NamedTuple):
-    """Where soft normalisation bends: speed, turning speed, force and torque [m/s, rad/s, N, Nm]."""
+    """Scales of soft normalisation: speed, turning speed, force and torque [m/s, rad/s, N, Nm]."""
 
     speed: float
     turning: float
@@ -37,7 +36,7 @@ class Scales(NamedTuple):
 
 
 class Features(NamedTuple):
-    """One demonstration as the model sees it, W windows.
+    """Features of one demonstration, W windows.
 
     Attributes:
         motion: (W, 6) u.
@@ -54,7 +53,7 @@ class Features(NamedTuple):
 
 
 def soft(x: Float, scale: float) -> Float:
-    """X (..., 3) softly normalised, so shorter than one."""
+    """X (..., 3) softly normalised."""
     result: Float = x / np.sqrt((x * x).sum(-1, keepdims=True) + scale * scale)
     return result
 
@@ -71,7 +70,7 @@ def regressors(contact: Float) -> Float:
 
 
 def scales(demonstrations: Sequence[Windows]) -> list[Scales]:
-    """The scales of each demonstration. Force and torque are those of all."""
+    """Scales of each demonstration, force and torque those of all."""
     wrench = [w.wrench for w in demonstrations]
     force = max(0.2 * _percentile(wrench, slice(0, 3), 90), 1.5 * _noise(wrench, slice(0, 3)), 1e-9)
     torque = max(0.2 * _percentile(wrench, slice(3, 6), 90), 1.5 * _noise(wrench, slice(3, 6)), force * ARM_M)
@@ -95,7 +94,7 @@ def features(demonstration: Windows, scale: Scales) -> Features:
 
 
 def typical_scales(each: Sequence[Scales]) -> Scales:
-    """The scales for a demonstration, or a run, that was not among these: the medians."""
+    """Median scales, for a new demonstration or run."""
     return Scales(*(float(np.median(values)) for values in zip(*each, strict=True)))
 
 

@@ -1,17 +1,13 @@
-r"""How a phase feels, and the gate of execution: which phase the contact wrench asks for, whatever the robot does.
+r"""Gate of execution: the phase that the contact wrench indicates.
 
-While a policy runs, the robot's motion is chosen by the phase, so motion is no evidence of a phase: the filter of the
-demonstrations would confirm whatever runs. Only what the environment says counts. The published softmax per pair of
-phases sees one sample a transition and is too weak to decide alone (our finding: 32 of 48 switches within a second).
-Every window of a phase is a sample of how it feels:
+The running phase chooses the robot's motion, which is therefore no evidence. The published softmax per pair of phases
+has one sample a transition and is too weak alone; every window of a phase is a sample of its wrench:
 
     a ~ N(m_j, C_j),    C_j = (S_j + S) / 2 + 0.05^2 I,    alpha_t(j) ~ N(a_t; m_j, C_j) sum_i alpha_{t-1}(i) T(i, j)
 
 with a the softly normalised wrench, m_j and S_j its mean and covariance under the posteriors of EM, S the mean of all
-S_j by their windows, and T the transitions of the most likely paths, counted, plus 1e-4 (constants ours). Where the
-covariances are equal this is a softmax of a. A softmax that is fitted instead needs the margin, and finds it in
-whatever differs between three demonstrations, such as the side that a tool leans on; the spread within a phase says
-that this differs anyway, and leaves the sign of friction, which turns with the motion within 0.1 s.
+S_j by their windows, and T the counted transitions of the most likely paths plus 1e-4. A fitted softmax would use
+chance differences of few demonstrations, which the spread within a phase discounts.
 """
 
 from __future__ import annotations
@@ -32,15 +28,15 @@ UNSEEN = 1e-4
 
 
 class Chain(Protocol):
-    """A gate of whatever kind: evidence for each phase, and the chain it drives."""
+    """Interface of a gate: evidence for each phase, and its chain."""
 
     @property
     def memory(self) -> int:
-        """Of how many windows it looks at the mean."""
+        """Number of windows in its mean."""
 
     @property
     def share(self) -> Float:
-        """(K,) what each phase has of all windows."""
+        """(K,) share of each phase in all windows."""
 
     @property
     def transition(self) -> Float:
@@ -52,12 +48,12 @@ class Chain(Protocol):
 
 @dataclass(frozen=True)
 class Gate:
-    """How K phases feel and the chain that this drives.
+    """Wrenches of K phases and their chain.
 
     Attributes:
         mean: (K, 6) m.
         covariance: (K, 6, 6) C.
-        share: (K,) mean gamma, what each phase has of all windows.
+        share: (K,) mean gamma, share of each phase in all windows.
         transition: (K, K) T.
     """
 
@@ -68,12 +64,12 @@ class Gate:
 
     @property
     def memory(self) -> int:
-        """Each window is looked at as it is."""
+        """Number of windows in its mean."""
         return 1
 
     @cached_property
     def whitening(self) -> tuple[Float, Float]:
-        """Inverse Cholesky factors (K, 6, 6) of C and log det (K, 1) of the factors, the same in every window."""
+        """Inverse Cholesky factors (K, 6, 6) of C, and log det (K, 1) of the factors."""
         lower = np.linalg.cholesky(self.covariance)
         return np.linalg.inv(lower), np.log(np.einsum("kii->ki", lower)).sum(-1)[:, None]
 
@@ -87,7 +83,7 @@ class Gate:
 
 
 def fit(drive: Sequence[Float], posterior: Float, paths: Sequence[NDArray[np.intp]]) -> Gate:
-    """A gate from regressors (W, R), which begin with the soft wrench, and most likely paths by demonstration.
+    """A gate from regressors (W, R), which begin with the soft wrench, and most likely paths.
 
     Args:
         drive: regressors (W, R) of each demonstration.
@@ -114,7 +110,7 @@ def averaged(regressors: Float, memory: int) -> Float:
 
 
 def counted(paths: Sequence[NDArray[np.intp]], phases: int) -> Float:
-    """(K, K) relative counts of transitions, none of them impossible."""
+    """(K, K) relative counts of transitions, all positive."""
     counts = np.full((phases, phases), UNSEEN)
     for path in paths:
         np.add.at(counts, (path[:-1], path[1:]), 1.0)

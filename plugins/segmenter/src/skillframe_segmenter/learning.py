@@ -1,19 +1,15 @@
-"""From whole demonstrations to a policy: cut them into phases, and learn each phase as a skill of its own.
+"""Learn a policy from whole demonstrations: cut them into phases, and learn each phase as a skill.
 
-Two phases may be one skill shown from two sides: if they never share a demonstration and stand at the same place in
-the sequence (after the same phases, before the same phases), if demonstrations begin with the one and with the other
-(a policy has one beginning), or if one is what another demonstration leaves out on its way from the other, or a detour
-from it, without which a demonstration is like another. They are joined if the learner finds one desired direction for
-both, which is the definition itself, and if each can turn the tool about the axis, in whatever sense, that the other
-turns it about: lowering and interlocking are one push, but not one motion. So are two that follow each other, both in
-contact and with the attitude held, and were learned as pushes less than 35 degrees apart: a box that touches a wall on
-its way into a corner is still pushed the same way. What the tool does in free air is another matter, since a push that
-leans on the friction cone explains both. Our choice; the papers join phases by their model alone.
+Two phases may be one skill shown from two sides if they never share a demonstration and have the same neighbours, if
+both begin demonstrations, or if one is optional on the way from the other or a detour from it. They are joined if one
+desired direction explains both, and each can turn the tool about the other's axis. Consecutive phases are joined too if
+both are in contact, hold their orientation, and push less than 35 degrees apart, as of a box that touches a wall on its
+way into a corner; in free air a push that leans on the friction cone explains too much.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby, pairwise
 from math import cos, inf, radians
@@ -30,25 +26,29 @@ from skillframe_segmenter.agreement import check_agreement
 from skillframe_segmenter.air import Learner, learned_in_air
 from skillframe_segmenter.boards import learn_places, names_places
 from skillframe_segmenter.boundaries import Move, moved, parse_move
+from skillframe_segmenter.contacts import at_contact
 from skillframe_segmenter.explained import explained
 from skillframe_segmenter.segmentation import refitted
 from skillframe_segmenter.settings import PHASE_MIN_S, PolicySettings, Settings
 from skillframe_segmenter.zvc import ZvcSettings
 
 SHORTEST_S = 0.25
+WRENCHES = "wrench_hmm"
 SAME_PUSH = cos(radians(35.0))
 OWN = ("segmenter", "skill", "phases", "recoveries", "set_boundary", "places")
 
 
-BETWEEN = ("recoveries", "set_boundary", "places")  # settings of the whole, not of what is done at one place
+Fit = Callable[[Sequence[Demonstration], int | None, Mapping[str, Any]], Document]
+
+BETWEEN = ("recoveries", "set_boundary", "places")  # settings of the whole policy, not of a place
 
 
 def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Document:
-    """The body of a policy document. Demonstrations that name places are learned from place by place (`boards`).
+    """Body of a policy document, learned by place (`boards`) if the demonstrations name places.
 
     Settings: `places` (true), `segmenter` (wrench_hmm), `skill` (lmc), `phases` (found), `recoveries` (1),
-    `set_boundary` (a list of "DEMONSTRATION:BOUNDARY=SECONDS", counted as they stand without it), those of the
-    segmenter, and those of the phases' learner.
+    `set_boundary` (a list of "DEMONSTRATION:BOUNDARY=SECONDS", counted as they stand without it), and those of the
+    segmenter and the phases' learner.
 
     Raises:
         InputError: demonstrations that cannot be cut or do not agree, or an unknown setting.
@@ -68,13 +68,18 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     check_agreement(found["demonstrations"], demonstrations)
     if own["phases"] is None:
         found = _joined(found, demonstrations, own["skill"], options, stand_ins=True)
+        if found["phase_model"].get("type") == WRENCHES and not moves:
+            found = at_contact(
+                found, demonstrations, lambda rows: _two(demonstrations, rows, segmenter.fit, cutting), options.at,
+                options.axes,
+            )  # fmt: skip
     if moves:
         found = _held(found, demonstrations, moved(found["demonstrations"], moves, names), moves, own, cutting)
     parts = [pieces(found, demonstrations, [k]) for k in range(_count(found))]
     bodies = [learned_in_air(_learner(own["skill"]), each, options) for each in parts]
     return {
         **{key: value for key, value in bodies[0].items() if key in ("frame", *_alike(bodies))},
-        "phases": [_as_phase(body, own["skill"], _alike(bodies)) for body in bodies],
+        "phases": [as_phase(body, own["skill"], _alike(bodies)) for body in bodies],
         "recoveries": own["recoveries"],
         "phase_min_s": PHASE_MIN_S,
         "explained": explained(found["demonstrations"], demonstrations, options.at, options.axes),
@@ -83,12 +88,12 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
 
 
 def _alike(bodies: Sequence[Document]) -> list[str]:
-    """What all learned phases say alike, beside `phases`."""
+    """Keys beside `phases` that all learned phases share."""
     return [key for key, value in bodies[0].items() if key != "phases" and all(b.get(key) == value for b in bodies)]
 
 
-def _as_phase(body: Document, skill: str, shared: Sequence[str]) -> Document:
-    """A learned phase as it stands in a policy: with all that it says beside `phases` and others do not, as a path."""
+def as_phase(body: Document, skill: str, shared: Sequence[str]) -> Document:
+    """A learned phase in a policy, with the keys of its own beside `phases`."""
     beside = {key: value for key, value in body.items() if key not in ("phases", "frame", *shared)}
     return {**body["phases"][0], "skill": skill, **({"beside": beside} if beside else {})}
 
@@ -111,7 +116,7 @@ def _held(
     found: Document, demonstrations: Sequence[Demonstration], rows: Sequence[Document], moves: Sequence[Move],
     own: Mapping[str, Any], cutting: Mapping[str, Any],
 ) -> Document:  # fmt: skip
-    """The segmentation with rows in which a person has moved boundaries. A model of micro-phases is fitted again."""
+    """The segmentation with the user's boundaries, a model of micro-phases fitted again."""
     if "phase_of" not in found["phase_model"]:
         return {**found, "demonstrations": list(rows)}
     again = refitted(found, demonstrations, rows, {m.demonstration for m in moves}, own["phases"], cutting)
@@ -119,14 +124,25 @@ def _held(
     return again
 
 
+def _two(
+    demonstrations: Sequence[Demonstration], rows: Sequence[Document], fit: Fit, cutting: Mapping[str, Any]
+) -> Document:  # fmt: skip
+    """A model of two phases, fitted with all demonstrations held to their rows."""
+    two = fit(demonstrations, 2, cutting)
+    if len(two["phase_model"]["phase_of"]) != 2:
+        raise InputError("contact", "is no two phases of the model", "name the number of phases")
+    apart = {**two, "phase_model": {**two["phase_model"], "phase_of": [0, 1]}}
+    return refitted(apart, demonstrations, rows, set(range(len(rows))), 2, cutting)
+
+
 def _count(found: Document) -> int:
     return len(found["phase_model"]["successors"])
 
 
 def pieces(found: Document, demonstrations: Sequence[Demonstration], phases: Sequence[int]) -> list[Demonstration]:
-    """The parts of all demonstrations that belong to some phases. Very short ones count only if there are no others.
+    """Parts of all demonstrations in some phases, very short ones only if there are no others.
 
-    Neighbouring intervals of these phases stay one part.
+    Neighbouring intervals stay one part.
     """
     result = []
     for row, demonstration in zip(found["demonstrations"], demonstrations, strict=True):
@@ -141,12 +157,6 @@ def pieces(found: Document, demonstrations: Sequence[Demonstration], phases: Seq
     return long or result
 
 
-def _learn(
-    found: Document, demonstrations: Sequence[Demonstration], phase: int, skill: str, options: LearnOptions
-) -> Document:
-    return _learner(skill)(pieces(found, demonstrations, [phase]), options)
-
-
 def _learner(skill: str) -> Learner:
     kind = registry().skill(skill)
     if kind.learn is None:
@@ -157,25 +167,25 @@ def _learner(skill: str) -> Learner:
 def _joined(
     found: Document, demonstrations: Sequence[Demonstration], skill: str, options: LearnOptions, *, stand_ins: bool
 ) -> Document:  # fmt: skip
-    """The segmentation with those phases joined that the learner explains by one direction.
+    """The segmentation with phases of one direction joined.
 
-    What follows each other in contact may be joined before demonstrations are compared; phases that stand in for each
-    other may not, or one that stops half-way would only lack a phase.
+    Consecutive phases in contact may be joined before demonstrations are compared; alternatives only after, or an
+    incomplete one would merely lack a phase.
     """
     kind = registry().skill(skill)
     if kind.learn is None:
         return found
     rows = found["demonstrations"]
-    bodies = [_learn(found, demonstrations, k, skill, options) for k in range(_count(found))]
+    bodies = [_learner(skill)(pieces(found, demonstrations, [k]), options) for k in range(_count(found))]
     touching = {k for k in range(_count(found)) if _in_contact(found, demonstrations, k)}
     candidates = [
         ((one, two), pieces(found, demonstrations, [one]) + pieces(found, demonstrations, [two]))
         for one, two in (alternatives(rows) if stand_ins else [])
-        if _turn_alike(bodies[one], bodies[two])
+        if turn_alike(bodies[one], bodies[two])
     ] + [
         ((one, two), pieces(found, demonstrations, [one, two]))
         for one, two in neighbours(rows)
-        if {one, two} <= touching and _one_push(bodies[one], bodies[two])
+        if {one, two} <= touching and one_push(bodies[one], bodies[two])
     ]
     for (one, two), parts in candidates:
         if found["phase_model"].get("round") in (one, two):
@@ -188,7 +198,7 @@ def _joined(
 def _one_direction(
     learn_phase: Learner, parts: Sequence[Demonstration], options: LearnOptions
 ) -> bool:  # fmt: skip
-    """Whether one direction explains all of them. None does if the learner refuses them together (a press, say)."""
+    """Whether one direction explains all parts, and the learner accepts them together."""
     try:
         body = learn_phase(parts, options)
     except InputError:
@@ -202,7 +212,7 @@ def neighbours(rows: Sequence[Mapping[str, Any]]) -> list[tuple[int, int]]:
 
 
 def _in_contact(found: Document, demonstrations: Sequence[Demonstration], phase: int) -> bool:
-    """Whether a phase feels a force beyond the model's scale at most times. False where there is no such model."""
+    """Whether a phase's median force exceeds the model's scale, False without such a model."""
     scale: float = found["phase_model"].get("scales", {}).get("force", inf)
     force = np.concatenate([norm(piece.wrench[:, :3]) for piece in pieces(found, demonstrations, [phase])])
     return float(np.median(force)) > scale
@@ -213,8 +223,8 @@ def _part(body: Document, name: str) -> Mapping[str, Any]:
     return part
 
 
-def _one_push(one: Document, two: Document) -> bool:
-    """Whether two learned phases hold their attitude and push the same way."""
+def one_push(one: Document, two: Document) -> bool:
+    """Whether two learned phases hold their orientation and push the same way."""
     turns = [_part(body, "rotation") for body in (one, two)]
     if any(
         turn.get("desired_direction") or turn.get("compliant_axes") or turn.get("fully_compliant") for turn in turns
@@ -224,13 +234,13 @@ def _one_push(one: Document, two: Document) -> bool:
     return a is not None and b is not None and sum(x * y for x, y in zip(a, b, strict=True)) > SAME_PUSH
 
 
-def _turn_alike(one: Document, two: Document) -> bool:
-    """Whether each phase can turn the tool about the axis, in whatever sense, that the other turns it about."""
+def turn_alike(one: Document, two: Document) -> bool:
+    """Whether each phase can turn the tool about the axis of the other."""
     return all(_gives(_part(a, "rotation"), _part(b, "rotation")) for a, b in ((one, two), (two, one)))
 
 
 def _gives(turn: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
-    """Whether a phase that turns as `turn` may turn about the desired axis of the other, if that has one."""
+    """Whether a phase that turns as `turn` may turn about the desired axis of the other, if any."""
     wanted, own = other.get("desired_direction"), turn.get("desired_direction")
     if wanted is None or turn.get("fully_compliant"):
         return True
@@ -240,7 +250,7 @@ def _gives(turn: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
 
 
 def alternatives(rows: Sequence[Mapping[str, Any]]) -> list[tuple[int, int]]:
-    """Pairs that begin demonstrations, or never share one and have the same neighbours, or of which one is left out."""
+    """Pairs that begin demonstrations, or never share one and have the same neighbours, or of which one is optional."""
     labels = [list(row["labels"]) for row in rows]
     firsts = {each[0] for each in labels}
     phases = sorted({label for each in labels for label in each})
@@ -258,7 +268,7 @@ def alternatives(rows: Sequence[Mapping[str, Any]]) -> list[tuple[int, int]]:
         return before == {one} and after <= neighbours(one)[1]
 
     def detour(one: int, two: int) -> bool:
-        """Whether `two` comes after `one` only, and demonstrations are like others once it is taken out of them."""
+        """Whether `two` comes after `one` only, and demonstrations without it are like others."""
         taken_out = [[k for k, _ in groupby(k for k in each if k != two)] for each in labels if two in each]
         return neighbours(two)[0] == {one} and all(each in labels for each in taken_out)
 
@@ -271,10 +281,15 @@ def alternatives(rows: Sequence[Mapping[str, Any]]) -> list[tuple[int, int]]:
 
 
 def relabelled(found: Document, one: int, two: int) -> Document:
-    """The segmentation with phase `two` counted as phase `one`, and later ones moved up."""
+    """The segmentation with phase `two` counted as `one`, and later ones renumbered."""
     count = _count(found)
     number = [one if k == two else k - (k > two) for k in range(count)]
-    rows = [_without_repeats(row, [number[k] for k in row["labels"]]) for row in found["demonstrations"]]
+    rows: list[Document] = []
+    for row in found["demonstrations"]:
+        labels, cuts = [number[k] for k in row["labels"]], row["boundaries"]
+        kept = [i for i in range(1, len(labels)) if labels[i] != labels[i - 1]]
+        new = [labels[0], *(labels[i] for i in kept)]
+        rows.append({**row, "boundaries": [cuts[i - 1] for i in kept], "labels": new})
     counts = [[0.0] * count for _ in range(count - 1)]
     for row in rows:
         for before, after in pairwise([*row["labels"], count - 1]):
@@ -285,10 +300,3 @@ def relabelled(found: Document, one: int, two: int) -> Document:
     if "phase_of" in model:
         model["phase_of"] = [number[k] for k in model["phase_of"]]
     return {**found, "phase_model": model, "demonstrations": rows}
-
-
-def _without_repeats(row: Mapping[str, Any], labels: Sequence[int]) -> Document:
-    """A row with new labels, its boundaries between equal ones gone."""
-    kept = [i for i in range(1, len(labels)) if labels[i] != labels[i - 1]]
-    cuts = row["boundaries"]
-    return {**row, "boundaries": [cuts[i - 1] for i in kept], "labels": [labels[0], *(labels[i] for i in kept)]}

@@ -1,4 +1,4 @@
-"""The phase model as it stands in a policy file: what is needed to follow the phases online, checked when read."""
+"""The phase model of a policy file, which follows the phases online."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ WHERE = "phase_model"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Pose0:
-    """What poses are compared with where they drive the transitions: mean position and attitude, and their spread."""
+    """Reference of poses that drive transitions: mean position and orientation, and their spread."""
 
     position: Float
     rotation: Float
@@ -36,17 +36,17 @@ class PhaseModel:
     """K micro-phases that make up P phases.
 
     Attributes:
-        at: (3,) point of the tool frame whose motion and wrench are looked at.
+        at: (3,) observed point of the tool frame.
         axes: "base" or "phase_start".
-        scales: of soft normalisation, for demonstrations and runs that were not learned from.
+        scales: of soft normalisation, for new demonstrations and runs.
         temper: eta.
         phase_of: (K,) phase of each micro-phase.
-        phases: how each micro-phase moves.
+        phases: motion of each micro-phase.
         initial: (K,); weights: (K, K, R) of the transitions.
-        gate: how each feels, or where it is; alone it decides in execution.
-        successors: (P, P + 1) how often each phase was followed by each, the last column is the end.
+        gate: wrench or pose of each, which alone decides in execution.
+        successors: (P, P + 1) counts of successions, the last column the end.
         switch_posterior, switch_windows: online, a phase takes over when it is this probable for so many windows.
-        origin: what poses are compared with; None where the wrench drives the transitions.
+        origin: reference of poses; None where the wrench drives the transitions.
     """
 
     at: Float
@@ -75,7 +75,7 @@ class PhaseModel:
 
 
 def to_document(model: PhaseModel, kind: str) -> Document:
-    """The model as plain JSON values."""
+    """The model as JSON values."""
     document: Document = {
         "type": kind, "version": VERSION, "window_s": WINDOW_S, "at": model.at.tolist(), "axes": model.axes,
         "scales": model.scales._asdict(), "temper": model.temper, "phase_of": model.phase_of.tolist(),
@@ -94,7 +94,7 @@ def from_document(document: Document) -> PhaseModel:
     """The model of a document.
 
     Raises:
-        InputError: a key that is missing or holds the wrong thing, or parts whose sizes do not agree.
+        InputError: a key that is missing or has a wrong value, or sizes that do not agree.
     """
     if document.get("version") != VERSION or document.get("window_s") != WINDOW_S:
         raise InputError(f"{WHERE}.version", "is not one that this plug-in can follow online", "segment again")
@@ -106,32 +106,24 @@ def from_document(document: Document) -> PhaseModel:
     _demand(successors.shape == (p, p + 1), "successors", f"should be {p} rows of {p + 1}")
     scales: dict[str, float] = _get(document, "scales", dict[str, float])
     _demand(set(scales) == set(Scales._fields) and min(scales.values()) > 0.0, "scales", "should hold four lengths > 0")
+    values: dict[str, Any] = _get(document, "gate", dict[str, Any])
+    chain = _array(values, "share", (k,)), _array(values, "transition", (k, k))
+    gate: Gate | PoseGate
+    if "origin" in document:
+        gate, place = PoseGate(_array(values, "weights", (k, r)), *chain), _get(document, "origin", dict[str, Any])
+        origin = Pose0(
+            position=_array(place, "position", (3,)), rotation=_array(place, "rotation", (3, 3)),
+            spread=_array(place, "spread", (2,)),
+        )  # fmt: skip
+    else:
+        gate, origin = Gate(_array(values, "mean", (k, DIMENSIONS)), _covariance(values, k), *chain), None
     return PhaseModel(
         at=_array(document, "at", (3,)), axes=_get(document, "axes", str), scales=Scales(**scales),
         temper=_get(document, "temper", float), phase_of=phase_of,
         phases=Phases(_array(document, "direction", (k, DIMENSIONS)), _covariance(document, k)),
         initial=_array(document, "initial", (k,)), weights=_array(document, "transition_weights", (k, k, r)),
-        gate=_gate(document, k, r),
-        successors=successors, switch_posterior=_get(document, "switch_posterior", float),
-        switch_windows=_get(document, "switch_windows", int), origin=_origin(document),
-    )  # fmt: skip
-
-
-def _gate(document: Document, k: int, r: int) -> Gate | PoseGate:
-    values: dict[str, Any] = _get(document, "gate", dict[str, Any])
-    chain = _array(values, "share", (k,)), _array(values, "transition", (k, k))
-    if "origin" in document:
-        return PoseGate(_array(values, "weights", (k, r)), *chain)
-    return Gate(_array(values, "mean", (k, DIMENSIONS)), _covariance(values, k), *chain)
-
-
-def _origin(document: Document) -> Pose0 | None:
-    if "origin" not in document:
-        return None
-    values: dict[str, Any] = _get(document, "origin", dict[str, Any])
-    return Pose0(
-        position=_array(values, "position", (3,)), rotation=_array(values, "rotation", (3, 3)),
-        spread=_array(values, "spread", (2,)),
+        gate=gate, successors=successors, switch_posterior=_get(document, "switch_posterior", float),
+        switch_windows=_get(document, "switch_windows", int), origin=origin,
     )  # fmt: skip
 
 

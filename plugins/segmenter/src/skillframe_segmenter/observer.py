@@ -1,8 +1,7 @@
-"""Which phase is it now? The gate for a robot that runs a policy, and the forward filter for a demonstration.
+"""Present phase of a run or demonstration: the gate for a robot, the forward filter for a demonstration.
 
-Both look at windows of 50 ms, N trials at once. A phase takes over when it has been more probable than
-`switch_posterior` for `switch_windows` windows in a row, so that a single odd window makes no switch, and only if it
-followed the present one in a demonstration: there is no way back that nobody has shown.
+Both use windows of 50 ms, N trials at once. A phase takes over after `switch_windows` windows in a row above
+`switch_posterior`, which ignores single odd windows, and only if it followed the present one in a demonstration.
 """
 
 from __future__ import annotations
@@ -23,8 +22,7 @@ from skillframe_segmenter.settings import WINDOW_S
 from skillframe_segmenter.windows import Windows, windows
 
 NOBODY = -1
-SHARPER, FELT = 2.5, 1.0 / 3.0  # the filter's likelihood of a motion over the fit's, and a wrench's share of that
-LONGER = 1  # windows that the filter waits beyond `switch_windows`
+SHARPER, FELT = 2.5, 1.0 / 3.0  # the filter's weight of a motion over the fit's, and a wrench's share of it
 STILL = (4e-3, float(np.deg2rad(2.0)))  # m/s, rad/s
 
 
@@ -37,7 +35,7 @@ class Debounce:
         self.seen = np.zeros(count, dtype=np.intp)
 
     def decide(self, posterior: Float) -> NDArray[np.intp]:
-        """The phase that has been probable for long enough (N,), or `NOBODY`. The posterior is (N, P)."""
+        """The phase that has been probable for long enough (N,), or `NOBODY`, from the posterior (N, P)."""
         best = posterior.argmax(axis=1)
         sure = posterior[np.arange(len(best)), best] > self._bar
         self.seen = np.where(sure & (best == self._candidate), self.seen + 1, sure.astype(np.intp))
@@ -46,12 +44,12 @@ class Debounce:
 
 
 class Asked(NamedTuple):
-    """What the gate says at the end of a window, N trials.
+    """Result of the gate at the end of a window, N trials.
 
     Attributes:
-        phase: (N,) the phase it asks for, or `NOBODY`.
+        phase: (N,) the indicated phase, or `NOBODY`.
         posterior: (N, P).
-        windows: (N,) for how many windows it has asked for that phase.
+        windows: (N,) since when it indicates that phase.
         still: (N,) the tool hardly moved since the last window.
     """
 
@@ -66,7 +64,7 @@ class Gate:
 
     Args:
         model: the phases.
-        center_of_compliance: (3,) where the observed wrench is taken, in the tool frame.
+        center_of_compliance: (3,) point of the observed wrench in the tool frame.
     """
 
     def __init__(self, model: PhaseModel, center_of_compliance: Float) -> None:
@@ -89,7 +87,7 @@ class Gate:
         assert k == len(self._members)
 
     def look(self, observation: Observation) -> Asked | None:
-        """Take in one tick. It answers at the end of each window."""
+        """Take in one tick, with a result at the end of each window."""
         self._sum += observation.wrench
         self._ticks += 1
         if self._ticks < self._per_window:
@@ -102,21 +100,19 @@ class Gate:
         )
         self.posterior = self._belief @ self._members
         phase = self._debounce.decide(self.posterior)
-        return Asked(phase, self.posterior, self._debounce.seen, self._still(observation))
-
-    def believe(self, row: int, phase: int) -> None:
-        """A trial has entered a phase for another reason than the gate's. Let the belief follow."""
-        mine = np.where(self._model.phase_of == phase, self._model.gate.share, 1e-6)
-        self._belief[row] = mine / mine.sum()
-
-    def _still(self, observation: Observation) -> NDArray[np.bool_]:
         now = Pose(observation.pose.position.copy(), observation.pose.rotation.copy())
         elapsed = self._per_window * observation.dt
         moved = norm(now.position - self._last.position)
         turned = norm((now.rotation - self._last.rotation).reshape(-1, 9)) / np.sqrt(2.0)
         self._last = now
-        still: NDArray[np.bool_] = (moved < STILL[0] * elapsed) & (turned < STILL[1] * elapsed)
-        return still
+        return Asked(
+            phase, self.posterior, self._debounce.seen, ((moved < STILL[0] * elapsed) & (turned < STILL[1] * elapsed))
+        )
+
+    def believe(self, row: int, phase: int) -> None:
+        """Set the belief of a trial that entered a phase for another reason."""
+        mine = np.where(self._model.phase_of == phase, self._model.gate.share, 1e-6)
+        self._belief[row] = mine / mine.sum()
 
     def _regressors(self, wrench: Float, observation: Observation) -> Float:
         rotation = observation.pose.rotation
@@ -133,12 +129,11 @@ class Gate:
 
 
 class Filter:
-    """The forward algorithm on windows, for demonstrations: how a phase moves, given the wrench, and how it feels.
+    """Forward algorithm on windows of demonstrations: motion given the wrench, and wrench.
 
-    It has no later windows to lean on, so a motion counts 2.5 times what it counts in the fit, and a wrench, which
-    wanders with the person's aim for half a second, a third of that (ours: with less of it a tool that is wound up
-    between friction and a soft hand is late, with more of it one that bounces). `follow` waits for one window more than
-    the gate. Where poses drive the transitions, how a phase feels is no evidence.
+    Without later windows, a motion counts 2.5 times as in the fit, and a wrench, which wanders with the teacher's aim,
+    a third of that: with less, a tool held by friction in a compliant grip is late, with more, one that bounces.
+    `follow` waits one window longer than the gate. Where poses drive the transitions, wrenches are no evidence.
     """
 
     def __init__(self, model: PhaseModel, count: int = 1) -> None:
@@ -151,7 +146,7 @@ class Filter:
         Args:
             motion: (N, 6) velocity and angular velocity.
             wrench: (N, 6).
-            drive: (N, R) regressors of the transitions, if it is not the wrench that drives them.
+            drive: (N, R) regressors of the transitions, if not the wrench.
         """
         model = self._model
         contact = soft_pair(wrench, model.scales.force, model.scales.torque)
@@ -180,7 +175,7 @@ def drive_of(model: PhaseModel, cut: Windows) -> Float:
 
 
 def follow(model: PhaseModel, demonstration: Demonstration, by: str = "filter") -> list[tuple[float, int]]:
-    """Phases of a demonstration as they would have been recognised while it went on.
+    """Phases of a demonstration as recognised online.
 
     Args:
         model: learned from other demonstrations of the task.
@@ -188,7 +183,7 @@ def follow(model: PhaseModel, demonstration: Demonstration, by: str = "filter") 
         by: "filter", or "gate".
 
     Returns:
-        Time of each switch and the phase that took over; the first entry is where it began.
+        Time of each switch and the new phase; the first entry is the start.
     """
     cut = windows(demonstration, model.at, model.axes)
     drive = drive_of(model, cut)
@@ -196,7 +191,7 @@ def follow(model: PhaseModel, demonstration: Demonstration, by: str = "filter") 
     watch, belief, debounce = (
         Filter(model),
         model.initial[None].copy(),
-        Debounce(model, 1, 0 if by == "gate" else LONGER),
+        Debounce(model, 1, 0 if by == "gate" else 1),  # windows that the filter waits beyond `switch_windows`
     )
     switches: list[tuple[float, int]] = []
     for i in range(cut.size):

@@ -1,15 +1,14 @@
-"""The policy that runs: phases in sequence, each a skill of its own, and what makes one give way to another.
+"""Policy that runs phases in sequence, each a skill of its own.
 
-A phase gives way to another that followed it in a demonstration
+A phase is followed by one that followed it in a demonstration
 
-- when the contact wrench asks for it: the gate's posterior exceeds its threshold for two windows of 50 ms, and the
-  phase has stopped moving the tool (under 4 mm/s and 2 degrees/s), or goes on moving it although the wrench has asked
-  for a second: a coupler that touches with one edge feels like one that is seated, but it is still turning; or
-- when its own skill has ended well, as an LMC does that comes to rest while pushing: then to what followed most often,
+- when the contact wrench indicates it for two windows of 50 ms and the phase has stopped moving the tool (under 4 mm/s
+  and 2 degrees/s, as a coupler that touches with one edge has the wrench of a seated one, but still turns), or after a
+  second; or
+- when its own skill ends with success: then by the most frequent one.
 
-and the policy ends where most demonstrations ended. A phase whose skill fails (a limit of force, time or travel) is
-recovered from: the phase that the wrench asks for starts again, `recoveries` times; then the policy fails with that
-phase's reason. The journal says which phase ran when, and why it was left.
+The policy ends where most demonstrations ended. After a failure (limit of force, time or travel) the phase that the
+wrench indicates starts again, `recoveries` times; then the policy fails.
 """
 
 from __future__ import annotations
@@ -22,14 +21,11 @@ from skillframe.document.frame import read_frame
 from skillframe.extend.records import Document
 from skillframe.extend.registry import registry
 from skillframe.frames import Float
-from skillframe.sequence import END, Composition, Part
+from skillframe.sequence import END, Composition, Moved, Part
 from skillframe.skill import Command, Observation, Skill, Status
 from skillframe_segmenter.document import PolicyDocument, read
 from skillframe_segmenter.observer import NOBODY, Gate
 from skillframe_segmenter.placed import Placed, is_placed, placement_of
-
-SETTLE_S = 0.15  # after entering a phase, before the gate may end it: three windows
-PATIENCE = 20  # windows
 
 
 def build(document: Document) -> Policy:
@@ -46,11 +42,11 @@ def _maker(document: Document) -> Callable[[], Skill]:
 
 
 def _placed(document: Document, index: int, make: Callable[[], Skill]) -> Callable[[], Skill]:
-    """The phase where its place is, if it belongs to one."""
+    """The phase in the frame of its place, if it has one."""
     if not is_placed(document["phases"][index]):
         return make
     placement = placement_of(document, index)
-    return lambda: Placed(placement, make)
+    return lambda: Moved(lambda: Placed(placement, make), placement.pose)
 
 
 class Policy(Composition):
@@ -58,13 +54,15 @@ class Policy(Composition):
 
     Args:
         parts: the phases' skills.
-        policy: what follows what.
-        gate: what the wrench says; None if phases end by themselves only.
+        policy: successions.
+        gate: of the wrench; None if phases end by themselves only.
     """
 
     def __init__(self, parts: Sequence[Part], policy: PolicyDocument, gate: Gate | None) -> None:
         super().__init__(parts)
         self._policy, self._gate = policy, gate
+
+    restart = Skill.restart  # one instance a trial: the gate's windows are those of all trials
 
     def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
         """Begin with the first phase."""
@@ -75,23 +73,24 @@ class Policy(Composition):
             self._gate.start(observation)
 
     def step(self, observation: Observation) -> Command:
-        """Let the phases answer, and look what the wrench asks for at the end of a window."""
+        """Run the phases, and apply the gate at the end of a window."""
         command = super().step(observation)
         asked = None if self._gate is None else self._gate.look(observation)
         if asked is None:
             return command
         wanted = (asked.phase != NOBODY) & (asked.phase != self.current) & (command.status == Status.RUNNING)
-        wanted &= (observation.time - self._entered >= SETTLE_S) & (asked.still | (asked.windows >= PATIENCE))
+        # the gate may end a phase after three windows, where the tool rests or the gate has insisted for 20 windows
+        wanted &= (observation.time - self._entered >= 0.15) & (asked.still | (asked.windows >= 20))
         for i in np.flatnonzero(wanted).tolist():
             phase = int(asked.phase[i])
             pending = self._due is not None and self._due[i] != END
             if not pending and self._policy.successors[self.current[i], phase] > 0.0:
                 sure = float(asked.posterior[i, phase])
-                self._go(i, phase, float(observation.time[i]), f"begins, as the wrench asks for it ({sure:.0%} sure)")
+                self._go(i, phase, float(observation.time[i]), f"begins, as the wrench indicates ({sure:.0%} sure)")
         return command
 
     def follows(self, row: int, part: int, status: int, reason: str) -> tuple[int, int, str]:
-        """What followed most often after a success, or after a failure what the wrench asks for."""
+        """The most frequent successor after a success, or the phase that the wrench indicates after a failure."""
         if status == Status.SUCCESS:
             following = int(self._policy.successors[part].argmax())
             if following == len(self.parts):
@@ -104,7 +103,7 @@ class Policy(Composition):
         return END, status, reason
 
     def switch(self, row: int, part: int, time: float, why: str) -> None:
-        """Enter a phase for a reason of the phases' own, and let the gate know."""
+        """Enter a phase for a reason of the phases' own, and inform the gate."""
         self._go(row, part, time, why)
         if self._gate is not None:
             self._gate.believe(row, part)
@@ -115,7 +114,7 @@ class Policy(Composition):
 
 
 def successor_words(successors: Float, phase: int) -> str:
-    """What follows a phase, in words."""
+    """The successors of a phase in words."""
     names = [f"phase {j + 1}" for j in range(len(successors))] + ["the end"]
     order = [j for j in np.argsort(-successors[phase]).tolist() if successors[phase, j] > 0.0]
     return " or ".join(names[j] for j in order) or "the end"

@@ -1,10 +1,10 @@
-r"""The gate of the pose-driven baseline: a softmax of the pose, as Kroemer et al. (ICRA 2015) drive their transitions.
+r"""Gate of the pose-driven baseline: a softmax of the pose, as transitions in Kroemer et al. (ICRA 2015).
 
     alpha_t(j) ~ p(j | x_t) / mean gamma_j  sum_i alpha_{t-1}(i) T(i, j),      p(j | x) = softmax_j(w_j . x)
 
-with x the mean over two windows of the pose relative to the mean one, and the weights tied to the phase that is
-entered: per pair of phases, as published, they see one sample a transition. Targets are the posteriors of EM; 25 damped
-diagonal-block Newton steps, ridge 0.05 (ours).
+with x the mean over two windows of the pose relative to the mean one, and weights by entered phase, since pairs of
+phases, as published, have one sample a transition. Targets are the posteriors of EM; 25 damped diagonal-block Newton
+steps, ridge 0.05.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ from skillframe.frames import Float
 from skillframe_segmenter.gate import averaged, counted
 from skillframe_segmenter.transitions import softmax
 
-STEPS, DAMPING, RIDGE = 25, 0.7, 0.05
+RIDGE = 0.05
 MEMORY = 2  # windows
 
 
 @dataclass(frozen=True)
 class PoseGate:
-    """The classifier of K phases and the chain it drives.
+    """Classifier of K phases and its chain.
 
     Attributes:
         weights: (K, R) w.
-        share: (K,) mean gamma, what each phase has of all windows.
+        share: (K,) mean gamma, share of each phase in all windows.
         transition: (K, K) T.
     """
 
@@ -39,7 +39,7 @@ class PoseGate:
 
     @property
     def memory(self) -> int:
-        """The mean of two windows is looked at."""
+        """Number of windows in its mean."""
         return MEMORY
 
     def log_evidence(self, regressors: Float) -> Float:
@@ -49,15 +49,15 @@ class PoseGate:
 
 
 def fit(drive: Sequence[Float], posterior: Float, paths: Sequence[NDArray[np.intp]]) -> PoseGate:
-    """A gate from regressors (W, R) and most likely paths by demonstration, and posteriors (W, K) of all windows."""
+    """A gate from regressors (W, R) and most likely paths by demonstration, and posteriors (W, K)."""
     regressors = np.concatenate([averaged(phi, MEMORY) for phi in drive])
     k = posterior.shape[1]
     weights = np.zeros((k, regressors.shape[1]))
     ridge = np.diag(np.full(regressors.shape[1], RIDGE))
-    for _ in range(STEPS if k > 1 else 0):
+    for _ in range(25 if k > 1 else 0):
         p = softmax(regressors @ weights.T)
         gradient = (posterior - p).T @ regressors - RIDGE * weights
         curvature = (p * (1.0 - p)).T[:, :, None] * regressors
         hessian = np.swapaxes(curvature, -1, -2) @ regressors + ridge
-        weights = weights + DAMPING * np.linalg.solve(hessian, gradient[..., None])[..., 0]
+        weights = weights + 0.7 * np.linalg.solve(hessian, gradient[..., None])[..., 0]
     return PoseGate(weights, np.maximum(posterior.mean(axis=0), 1e-6), counted(paths, k))

@@ -1,21 +1,18 @@
-r"""Motion that goes round and round, as a wipe does: no linear motion with compliance, whatever its direction.
+r"""Motion that goes round and round, as a wipe, which no linear motion with compliance explains.
 
-Contact lets a phase move by M d with M positive semidefinite, so that it never goes against its desired direction:
+Contact lets a phase move by M d with M positive semidefinite, so it never opposes its desired direction:
 
     d . v = d^T M d >= 0,   hence   d . (x_j - x_i) = sum d . v h > 0        for all that moves along d at all.
 
-What comes back to where it was is therefore not one LMC. It may be several, there and back, or round by four straight
-strokes; a round has no straight strokes either. Windows i to j are a round if the tool
+Windows i to j are a round if the tool
 
-    comes back:            |x_j - x_i| < path / 4, seen from the base and from the tool, which a crank turns along,
+    comes back:            |x_j - x_i| < path / 4, in base and in the tool's axes, which a crank turns along,
     goes round something:  4 pi area > 0.3 path^2 (of a circle 1, of a square 0.8, of there and back 0),
     turns all the time:    at least half of its windows turn by more than half of the mean, 2 pi / (j - i),
     moves, and widely:     |u| > 1/2 in nine windows of ten, and 2 area / path, a circle's radius, is over 5 mm.
 
-Lengths that differ by a twentieth are tried, and only the tightest count, those without a round inside; they are put
-together to stretches of time. What a hand does by the way is no phase: stretches shorter than a quarter of the
-demonstration's longest are left out, and most demonstrations must have one. The law is that of the model; the constants
-are ours.
+Only the tightest rounds count, joined to stretches of time of at least a quarter of the longest; most demonstrations
+must have one.
 """
 
 from __future__ import annotations
@@ -25,62 +22,47 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.frames import Float, norm, unit
+from skillframe.frames import Float, dot, norm, unit
 from skillframe_segmenter.features import Features
 from skillframe_segmenter.settings import WINDOW_S
 from skillframe_segmenter.windows import Windows
 
-SHORTEST, LONGEST = 6, 400  # windows
-BACK, ROUND, STEADY, MOVING, RADIUS_M = 0.25, 0.3, 0.5, 0.9, 0.005
-FAST, ASIDE = 0.5, 0.25  # |u|; of the longest stretch
 Mask = NDArray[np.bool_]
 
 
 def rounds(cut: Sequence[Windows], seen: Sequence[Features]) -> list[Mask] | None:
-    """Which windows of each demonstration go round, or None if that is no phase of theirs."""
+    """Windows of each demonstration that go round, or None if that is no phase."""
     found = [going_round(w, f) for w, f in zip(cut, seen, strict=True)]
     return found if 2 * sum(bool(each.any()) for each in found) > len(found) else None
 
 
 def going_round(cut: Windows, seen: Features) -> Mask:
-    """Which windows (W,) of a demonstration belong to a round."""
+    """Windows (W,) of a demonstration in a round."""
     step = WINDOW_S * cut.motion[:, :3]
     turn = _turning(unit(step))
-    path = _Path(step, np.einsum("tji,tj->ti", cut.rotation, step), norm(seen.motion[:, :3]) > FAST)
+    path = _Path(step, np.einsum("tji,tj->ti", cut.rotation, step), norm(seen.motion[:, :3]) > 0.5)
     result, count = np.zeros(cut.size, dtype=bool), cut.size
-    first_end = np.full(count + 1, 2 * count)  # of the rounds found that begin here or later
-    for length in _lengths(min(LONGEST, count)):
+    first_end = np.full(count + 1, 2 * count)  # of the rounds that begin here or later
+    length, longest = 6, min(400, count)  # windows
+    while length <= longest:
         starts = path.comes_back(length)
         starts, axis = path.loops(starts[first_end[starts] > starts + length], length)
         if len(starts):
             inside = starts[:, None] + np.arange(length - 1)
-            steady = np.vecdot(turn[inside], axis[:, None]) > np.pi / length
-            for i in starts[steady.mean(axis=1) >= STEADY].tolist():
+            steady = dot(turn[inside], axis[:, None]) > np.pi / length
+            for i in starts[steady.mean(axis=1) >= 0.5].tolist():
                 result[i : i + length] = True
                 first_end[: i + 1] = np.minimum(first_end[: i + 1], i + length)
-    return _without_asides(result)
-
-
-def _without_asides(going: Mask) -> Mask:
-    """Without stretches that are short beside the longest."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], going.astype(np.intp), [0]])))
-    starts, stops = edges[::2], edges[1::2]
-    result = going.copy()
-    for start, stop in zip(starts.tolist(), stops.tolist(), strict=True):
-        result[start:stop] = stop - start >= ASIDE * (stops - starts).max()
+        length = longest + 1 if length == longest else min(longest, length + max(1, length // 20))
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], result.astype(np.intp), [0]])))
+    begins, stops = edges[::2], edges[1::2]
+    for begin, stop in zip(begins.tolist(), stops.tolist(), strict=True):
+        result[begin:stop] = stop - begin >= 0.25 * (stops - begins).max()  # of the longest stretch
     return result
 
 
-def _lengths(longest: int) -> list[int]:
-    """Windows of the stretches that are tried."""
-    result = [SHORTEST]
-    while result[-1] < longest:
-        result.append(min(longest, result[-1] + max(1, result[-1] // 20)))
-    return [length for length in result if length <= longest]
-
-
 class _Path:
-    """A path as running sums, from which any stretch of it is judged."""
+    """A path as running sums, which give any stretch quickly."""
 
     def __init__(self, step: Float, step_of_tool: Float, moving: Mask) -> None:
         """Steps (W, 3) in base axes, the same in the tool's, and whether it moves (W,)."""
@@ -91,19 +73,19 @@ class _Path:
         self._axes = np.ascontiguousarray(self._place.T), np.ascontiguousarray(self._place_of_tool.T)
 
     def comes_back(self, length: int) -> NDArray[np.intp]:
-        """Starts of the stretches of `length` windows that end near where they began."""
-        near = BACK * (self._length[length:] - self._length[:-length])
+        """Starts of stretches of `length` windows that end near where they began."""
+        near = 0.25 * (self._length[length:] - self._length[:-length])
         back = [sum((x[length:] - x[:-length]) ** 2 for x in axes) for axes in self._axes]
         return np.flatnonzero(np.maximum(*back) < near * near)
 
     def loops(self, starts: NDArray[np.intp], length: int) -> tuple[NDArray[np.intp], Float]:
-        """Those that go round something, and widely, and the axis (S, 3) that they go round."""
+        """Those that go round widely, and their axis (S, 3)."""
         back, area, path, moving = (
             x[starts + length] - x[starts] for x in (self._place, self._area, self._length, self._moving)
         )
         area = area - 0.5 * np.cross(self._place[starts], back)
         size = norm(area)
-        fine = (2.0 * size > RADIUS_M * path) & (4.0 * np.pi * size > ROUND * path * path) & (moving >= MOVING * length)
+        fine = (2.0 * size > 0.005 * path) & (4.0 * np.pi * size > 0.3 * path * path) & (moving >= 0.9 * length)
         return starts[fine], area[fine] / size[fine, None]
 
 
@@ -116,6 +98,6 @@ def _turning(direction: Float) -> Float:
     one, two = direction[:-1], direction[1:]
     axis = np.cross(one, two)
     size = norm(axis)
-    angle = np.arctan2(size, np.vecdot(one, two))
+    angle = np.arctan2(size, dot(one, two))
     result: Float = axis * (angle / np.maximum(size, 1e-12))[:, None]
     return result

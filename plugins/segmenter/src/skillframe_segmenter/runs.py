@@ -1,4 +1,4 @@
-"""Runs of equal labels: short ones go to a neighbour, and labels become boundaries in time."""
+"""Runs of equal labels."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def starts_of_runs(labels: Labels) -> Labels:
 
 
 def without_short(labels: Labels, shortest: int) -> Labels:
-    """Labels without runs shorter than `shortest` windows: the shortest goes to its longer neighbour, until none is."""
+    """Labels with runs under `shortest` windows given to their longer neighbour, the shortest first."""
     result = labels.copy()
     while True:
         starts = starts_of_runs(result)
@@ -28,6 +28,6 @@ def without_short(labels: Labels, shortest: int) -> Labels:
 
 
 def in_order(labels: list[Labels]) -> dict[int, int]:
-    """New numbers for labels, in the order in which they first appear."""
+    """New numbers for labels, by first appearance."""
     seen = list(dict.fromkeys(int(x) for each in labels for x in each))
     return {old: new for new, old in enumerate(seen)}

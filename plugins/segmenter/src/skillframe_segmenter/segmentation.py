@@ -1,6 +1,6 @@
-"""From demonstrations to phases: windows, features, EM, the number of phases, and which of them are one motion.
+"""Segment demonstrations into phases.
 
-The flow of `wrench_hmm` (and, with poses instead of wrenches driving the transitions, of `pose_hmm`):
+The flow of `wrench_hmm` (and `pose_hmm`, driven by poses):
 
     windows -> features -> EM for K = 1, 2, ... -> best criterion -> transitions -> most likely path -> merge -> gate
 """
@@ -27,16 +27,15 @@ from skillframe_segmenter.rounds import rounds
 from skillframe_segmenter.settings import FEWEST_PER_PHASE, WINDOW_S, Settings
 from skillframe_segmenter.windows import Windows, cut_all
 
-SHORT, SHORT_JOINED = 3, (5, 8)  # windows; shorter runs go to a neighbour, before and after phases are joined
-SHORT_SHARE = 0.05  # of the demonstration, within `SHORT_JOINED`
+SHORT, SHORT_JOINED = 3, (5, 8)  # windows; shorter runs go to a neighbour, before and after joining
 Labels = NDArray[np.intp]
 
 
 class Prepared(NamedTuple):
-    """Demonstrations as the model sees them.
+    """Demonstrations as data of the model.
 
     Attributes:
-        cut: in windows; point: (3,) that was looked at; scale: of each; seen: features.
+        cut: in windows; point: (3,) observed; scale: of each; seen: features.
         drive: (W, R) regressors of the transitions, by demonstration; going: windows (W,) of each that go round, if
             that is a phase; origin: of poses, if they drive.
     """
@@ -56,8 +55,8 @@ class Segmented(NamedTuple):
     Attributes:
         fit: of the micro-phases; phase_of: (K,) phase of each.
         paths: micro-phase of every window; labels: phase of every window; both by demonstration.
-        criterion: by number of micro-phases tried.
-        round: the phase that goes round and round, or None.
+        criterion: by number of micro-phases.
+        round: the phase that goes round, or None.
     """
 
     fit: em.Fit
@@ -75,12 +74,12 @@ def segment(
 
     Args:
         demonstrations: one or more.
-        phases: how many; None finds the number.
+        phases: number of phases; None finds it.
         settings: by name, see `Settings`.
         kind: "wrench_hmm" or "pose_hmm".
 
     Raises:
-        InputError: demonstrations that cannot be cut, settings that make no sense, or too many phases.
+        InputError: demonstrations that cannot be cut, invalid settings, or too many phases.
     """
     chosen = build(Settings, settings, "--set")
     prepared = prepare(demonstrations, chosen, kind)
@@ -95,15 +94,15 @@ def refitted(
     document: Document, demonstrations: Sequence[Demonstration], rows: Sequence[Document], said: Set[int],
     phases: int | None, settings: Mapping[str, Any],
 ) -> Document:  # fmt: skip
-    """A segmentation fitted again, the demonstrations that a person has spoken about held as their rows say.
+    """A segmentation fitted again, with the user's demonstrations held to their rows.
 
     Args:
         document: of `segment`, its phases joined or not.
-        demonstrations: as they were then.
+        demonstrations: as then.
         rows: `demonstrations` of the document with boundaries moved.
         said: numbers of those to hold.
-        phases: as they were then.
-        settings: as they were then.
+        phases: as then.
+        settings: as then.
 
     Raises:
         InputError: an interval shorter than a window.
@@ -133,25 +132,24 @@ def _model_of(prepared: Prepared, found: Segmented, settings: Settings, kind: st
 
 
 def prepare(demonstrations: Sequence[Demonstration], settings: Settings, kind: str) -> Prepared:
-    """Windows, features and what drives the transitions."""
+    """Windows, features and regressors of the transitions."""
     cut, point = cut_all(demonstrations, settings.at, settings.axes)
     scale = scales(cut)
     seen = [features(w, s) for w, s in zip(cut, scale, strict=True)]
     going = rounds(cut, seen)
     if kind == "pose_hmm":
-        origin = _origin(cut)
+        position = np.concatenate([w.position for w in cut])
+        rotation = np.concatenate([w.rotation for w in cut])
+        left, _, right = np.linalg.svd(rotation.mean(axis=0))
+        mean = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+        spread = [
+            np.sqrt(position.var(axis=0).sum()),
+            np.sqrt((rotation_vector(rotation @ mean.T) ** 2).sum(-1).mean()),
+        ]
+        origin = Pose0(position=position.mean(axis=0), rotation=mean, spread=np.maximum(spread, [1e-3, 1e-2]))
         drive = [pose_regressors(w.position, w.rotation, origin) for w in cut]
         return Prepared(cut, point, scale, seen, drive, going, origin)
     return Prepared(cut, point, scale, seen, [f.regressors for f in seen], going, None)
-
-
-def _origin(cut: Sequence[Windows]) -> Pose0:
-    position = np.concatenate([w.position for w in cut])
-    rotation = np.concatenate([w.rotation for w in cut])
-    left, _, right = np.linalg.svd(rotation.mean(axis=0))
-    mean = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
-    spread = [np.sqrt(position.var(axis=0).sum()), np.sqrt((rotation_vector(rotation @ mean.T) ** 2).sum(-1).mean())]
-    return Pose0(position=position.mean(axis=0), rotation=mean, spread=np.maximum(spread, [1e-3, 1e-2]))
 
 
 def pose_regressors(position: Float, rotation: Float, origin: Pose0) -> Float:
@@ -170,12 +168,12 @@ def _check_count(demonstrations: Sequence[Demonstration], cut: Sequence[Windows]
         raise InputError(
             demonstrations[shortest].source or f"demonstration {shortest + 1}",
             f"is {demonstrations[shortest].duration:.2f} s long, which allows 1 to {most} phases, not {phases}",
-            "ask for fewer phases, or leave --phases away",
+            "give fewer --phases, or leave it out",
         )
 
 
 def fit(data: em.Data, prepared: Prepared, phases: int | None, settings: Settings) -> Segmented:
-    """Phases of prepared demonstrations, numbered in the order in which they appear."""
+    """Phases of prepared demonstrations, numbered by first appearance."""
     signals = [np.hstack([f.motion, 0.5 * f.contact]) for f in prepared.seen]
     goes_round = data.going is not None
     if phases == 1 or not data.straight.any():
@@ -199,7 +197,6 @@ def fit(data: em.Data, prepared: Prepared, phases: int | None, settings: Setting
 
 
 def _numbers(data: em.Data, settings: Settings) -> range:
-    """The numbers of phases that are tried."""
     free = [int(each.sum()) for each in data.split(data.straight)]
     most = min(settings.phases_max, min((n for n in free if n >= FEWEST_PER_PHASE), default=0) // FEWEST_PER_PHASE)
     going = int(data.going is not None)
@@ -207,12 +204,11 @@ def _numbers(data: em.Data, settings: Settings) -> range:
 
 
 def _shortest(path: Labels) -> int:
-    """Windows of the shortest interval that is told apart in a demonstration."""
-    return int(np.clip(round(SHORT_SHARE * len(path)), *SHORT_JOINED))
+    return int(np.clip(round(0.05 * len(path)), *SHORT_JOINED))  # of the demonstration, within `SHORT_JOINED`
 
 
 def _numbered(found: Segmented) -> Segmented:
-    """Phases by first appearance. Micro-phases whose phase holds no window join the phase of their nearest motion."""
+    """Phases by first appearance, micro-phases of empty ones joined to the nearest motion."""
     number = runs.in_order(found.labels)
     direction = found.fit.model.phases.direction
     kept = np.array([k for k, g in enumerate(found.phase_of) if int(g) in number])
@@ -227,7 +223,6 @@ def _numbered(found: Segmented) -> Segmented:
 def _refit(
     data: em.Data, prepared: Prepared, found: Segmented, rows: Sequence[Document], said: Set[int], settings: Settings
 ) -> Segmented:
-    """EM again, with the phases of demonstrations whose boundaries a person has moved held as said."""
     k = len(found.phase_of)
     ruled = [
         np.where(found.phase_of == _labels_of(rows[i], w)[:, None], 0.0, em.NEVER)
@@ -249,7 +244,6 @@ def _refit(
 def _said_to_go(
     data: em.Data, prepared: Prepared, found: Segmented, rows: Sequence[Document], said: Set[int]
 ) -> em.Data:  # fmt: skip
-    """The data with what goes round where a person has said so, in demonstrations that a person has spoken about."""
     if data.going is None or len(found.phase_of) == 1:
         return data._replace(going=None)
     going = [
@@ -260,7 +254,6 @@ def _said_to_go(
 
 
 def _labels_of(row: Document, cut: Windows) -> Labels:
-    """Phase of every window from boundaries in time. A window belongs to where its middle is."""
     middle = np.array(cut.edges(range(cut.size))) + 0.5 * (cut.edges([1])[0] - cut.start)
     return np.array(row["labels"], dtype=np.intp)[np.searchsorted(row["boundaries"], middle)]
 
@@ -279,7 +272,7 @@ def rows_of(cut: Sequence[Windows], labels: Sequence[Labels], names: Sequence[st
 
 
 def online_model(prepared: Prepared, found: Segmented, settings: Settings) -> PhaseModel:
-    """What is needed to follow the phases online."""
+    """The model that follows the phases online."""
     chosen = found.fit.model
     kind = gate if prepared.origin is None else pose_gate
     return PhaseModel(
@@ -292,7 +285,7 @@ def online_model(prepared: Prepared, found: Segmented, settings: Settings) -> Ph
 
 
 def successors(labels: Sequence[Labels], phases: int) -> Float:
-    """(P, P + 1) how often each phase was followed by each. The last column counts ends."""
+    """(P, P + 1) counts of successions, the last column ends."""
     counts = np.zeros((phases, phases + 1))
     for each in labels:
         order = [int(x) for x in each[runs.starts_of_runs(each)]]

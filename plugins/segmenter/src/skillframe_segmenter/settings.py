@@ -1,6 +1,6 @@
-"""The segmenters' constants, all changeable with `segment --set NAME=VALUE`.
+"""The segmenters' constants, set with `segment --set NAME=VALUE`.
 
-None of them is printed in the papers; they are our choice, from comparisons on simulated tasks and real recordings.
+The papers print none; these are from comparisons on simulated tasks and real recordings.
 """
 
 from __future__ import annotations
@@ -12,22 +12,21 @@ from skillframe.errors import InputError
 
 WINDOW_S = 0.05
 FEWEST_PER_PHASE = 4
-"""Windows without which nothing can be learned of a phase."""
+"""Fewest windows to learn a phase from."""
 PHASE_MIN_S = FEWEST_PER_PHASE * WINDOW_S
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cutting:
-    """What the segmenters go by, wherever they look from.
+    """Settings of all segmenters.
 
     Attributes:
         temper: weight of a window's likelihood in a demonstration of `temper_windows` windows; windows are correlated,
-            so a demonstration counts as about 30 samples however finely it is cut.
+            so a demonstration counts as about 30 samples.
         temper_windows: see `temper`; longer demonstrations are weighted down to a tenth of it.
-        stay_s: mean time a phase is expected to last before the data are seen [s].
+        stay_s: prior mean duration of a phase [s].
         phases_max: largest number of phases tried where the number is not given.
-        merge_angle_rad: motion this far from what one desired direction explains still belongs to it: larger joins more
-            phases into one.
+        merge_angle_rad: deviation from one desired direction that still belongs to it; larger joins more phases.
         merge_votes: least share of windows that one direction must explain for two phases to be one.
         switch_posterior, switch_windows: online, a phase takes over when it is this probable for so many windows.
     """
@@ -53,11 +52,11 @@ class Cutting:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Settings(Cutting):
-    """What the segmenters go by.
+    """Settings of the model-based segmenters.
 
     Attributes:
-        axes: "base", or "phase_start": the tool's attitude at the start of the demonstration.
-        at: point of the tool frame whose motion and wrench are looked at; None for the recorded tool point.
+        axes: "base", or "phase_start": the tool's orientation at the start of the demonstration.
+        at: observed point of the tool frame; None for the recorded tool point.
     """
 
     axes: str = "base"
@@ -71,16 +70,16 @@ class Settings(Cutting):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PolicySettings(Cutting):
-    """What `learn --skill policy --set` can change. The other keys go to the learner of the phases.
+    """Settings of `learn --skill policy --set`, whose other keys go to the learner of the phases.
 
     Attributes:
-        segmenter: what cuts demonstrations into phases: wrench_hmm, pose_hmm or zvc. The settings of `zvc` are `still`
-            and `force_n`; all others here are those of the first two.
-        skill: what each phase is learned as; its own settings can be given as well, see `plugins show lmc`.
-        phases: how many there are; found where it is not given.
+        segmenter: wrench_hmm, pose_hmm or zvc. The settings of `zvc` are `still` and `force_n`; all others here are
+            those of the first two.
+        skill: kind of skill of each phase, which has its own settings, see `plugins lmc`.
+        phases: number of phases; found where it is not given.
         recoveries: how often a run may go back to an earlier phase.
-        set_boundary: a list of "DEMONSTRATION:BOUNDARY=SECONDS" that a person has moved, counted as they stand without.
-        places: learn in the frames of the places that the recordings name; where they name none it says nothing.
+        set_boundary: a list of "DEMONSTRATION:BOUNDARY=SECONDS" that the user moved, counted as they stand without.
+        places: learn in the frames of the places that the recordings name, if any.
     """
 
     segmenter: str = "wrench_hmm"

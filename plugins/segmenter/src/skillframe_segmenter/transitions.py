@@ -1,13 +1,12 @@
-r"""What makes a phase give way to the next: the contact wrench, p(j | i, phi_t) = softmax_j(w_ij . phi_t), (5).
+r"""Transitions driven by the contact wrench: p(j | i, phi_t) = softmax_j(w_ij . phi_t), (5).
 
-The wrench of the new window drives the transition into it (interaction-driven transitions: Hagos, Suomalainen, Kyrki,
-IROS 2018; the softmax per pair is the form of Kroemer et al. 2015). A phase keeps itself with logit 0, and
+The wrench of the new window drives the transition into it (Hagos, Suomalainen, Kyrki, IROS 2018; softmax per pair:
+Kroemer et al. 2015). A phase keeps itself with logit 0, and
 
     prior of any other: -ln(20 max(K - 1, 1) s)        a mean stay of s seconds in windows of 50 ms.
 
-Weights are fitted late, after the motion alone has converged: a limit cycle in a contact teaches transitions to switch
-with it. Row-wise Newton steps on the expected log-likelihood, ridge 1 on the wrench's weights and 0.3 on the bias
-towards the prior, each step within +-3 (all ours).
+Weights are fitted after the motion, or a limit cycle in a contact would drive them, by row-wise Newton steps within
++-3, ridge 1 on the wrench's weights and 0.3 on the bias towards the prior.
 """
 
 from __future__ import annotations
@@ -22,7 +21,7 @@ RIDGE, BIAS_RIDGE, LARGEST_STEP = 1.0, 0.3, 3.0
 
 
 def prior_weights(phases: int, regressors: int, stay_s: float) -> Float:
-    """(K, K, R) weights before anything is learned: the bias, which is the last regressor's, only."""
+    """(K, K, R) prior weights: only the bias, the last regressor's."""
     weights = np.zeros((phases, phases, regressors))
     others = ~np.eye(phases, dtype=bool)
     weights[others, -1] = -np.log(max(phases - 1, 1) * stay_s / WINDOW_S)
@@ -30,7 +29,7 @@ def prior_weights(phases: int, regressors: int, stay_s: float) -> Float:
 
 
 def probabilities(weights: Float, regressors: Float) -> Float:
-    """(..., K, K) transition probabilities for regressors phi (..., R). Time is the last axis in memory."""
+    """(..., K, K) transition probabilities for regressors phi (..., R), time last in memory."""
     k, size = weights.shape[:2], weights.shape[-1]
     logits = weights.reshape(-1, size) @ regressors.reshape(-1, size).T
     p = np.moveaxis(softmax(logits.reshape(*k, -1), axis=1), -1, 0)
@@ -41,8 +40,8 @@ def improve(weights: Float, prior: Float, regressors: Float, joint: Float, steps
     """Weights after Newton steps, row by row.
 
     Args:
-        weights: (K, K, R) as they are.
-        prior: (K, K, R) where the ridge pulls the biases.
+        weights: (K, K, R) before.
+        prior: (K, K, R) of the biases.
         regressors: (W, R) of the windows that are entered.
         joint: (W, K, K) expected transitions into them.
         steps: of Newton's method.
@@ -68,7 +67,7 @@ def improve(weights: Float, prior: Float, regressors: Float, joint: Float, steps
 def _newton(
     row: Float, prior: Float, others: NDArray[np.intp], phi: Float, squares: Float, target: Float, ridge: Float
 ) -> Float:  # fmt: skip
-    """A step (n, R) for weights (K, R) of the others. phi (R, W), its squares (R (R + 1) / 2, W), target (K, W)."""
+    """A step (n, R) for weights (K, R) of the others: phi (R, W), its squares (R (R + 1) / 2, W), target (K, W)."""
     mass = target.sum(axis=0)
     p = softmax(row @ phi, axis=0)[others]
     pull = mass * p
@@ -79,7 +78,7 @@ def _newton(
 
 
 def _hessian(p: Float, pull: Float, squares: Float, size: int) -> Float:
-    """(n R, n R) sum pull_a (1[a = b] - p_b) phi phi^T over windows, each of its halves once."""
+    """(n R, n R) sum pull_a (1[a = b] - p_b) phi phi^T over windows, each half once."""
     n = len(p)
     a, b = np.triu_indices(n)
     blocks = (pull[a] * ((a == b)[:, None] - p[b])) @ squares.T
@@ -92,7 +91,7 @@ def _hessian(p: Float, pull: Float, squares: Float, size: int) -> Float:
 
 
 def softmax(logits: Float, axis: int = -1) -> Float:
-    """Probabilities of logits, which add to one along an axis."""
+    """Probabilities of logits, which sum to one along an axis."""
     e: Float = np.exp(logits - logits.max(axis=axis, keepdims=True))
     e /= e.sum(axis=axis, keepdims=True)
     return e

@@ -1,21 +1,17 @@
-r"""Which place a demonstration works at, and when: contacts, each in the frame that it belongs to.
+r"""Visits of places in a demonstration: contacts, each in the frame that it belongs to.
 
-A contact belongs to the place relative to which demonstrations agree best on where the tool first touched,
+A contact belongs to the place relative to which demonstrations agree best on the first touch,
 
     scatter(place) = sqrt(mean over demonstrations |x_i - mean x|^2),    x_i = touch of demonstration i seen from place
 
-over all places that every demonstration names, and `base`. Places within twice the smallest scatter (or 1 mm) cannot
-be told apart by it, as the places of one rigid board cannot: of those the nearest one is taken, and `base`, which is
-nowhere, only if it alone is left. Touches that scatter by more than 30 mm in every frame are refused. Contacts in a row
-at one place are one visit. A visit has
+over all common places and `base`. Of places within twice the smallest scatter (or 1 mm), as of one rigid board, the
+nearest is taken, `base` last. Scatter over 30 mm is refused. Consecutive contacts at one place are one visit, with
 
     way in     from the last time that the tool was 40 mm away from its first touch, to 8 mm before it
-    work       from 8 mm before the touch to the start of the way out; this is what a skill is learned from
-    way out    from the last rest before the tool goes away until it is 40 mm from where it last touched; a recording
-               that ends before has none
+    work       from there to the way out; the skill is learned from this
+    way out    from the last rest to 40 mm from the last touch, if recorded
 
-Contacts of less than a tenth of the usual impulse are knocks: a hand that lets go, a tool that is swung. All figures
-are ours.
+Contacts of less than a tenth of the usual impulse are knocks.
 """
 
 from __future__ import annotations
@@ -25,17 +21,14 @@ from typing import NamedTuple, NoReturn
 
 import numpy as np
 
-from skillframe.conditioning.audit import audit
-from skillframe.demonstration.places import places_of
+from skillframe.demonstration.contact import contact_evidence
 from skillframe.demonstration.record import Demonstration
+from skillframe.document.frame import places_of
 from skillframe.errors import InputError
 from skillframe.frames import Float, Pose, norm, unit
 
 BASE = "base"
 FAR_M, NEAR_M, ALIKE_M, ALIKE = 0.04, 0.008, 0.001, 2.0
-AGREE_M = 0.03  # touches that scatter more in every frame are not of one place
-KNOCK = 0.1  # of the median over places of the strongest contact, as peak force times duration
-SMOOTH_S, REST_M_S = 0.1, 0.005  # s over which a speed is averaged, and what is a rest
 TIP = "tip"
 
 
@@ -47,7 +40,7 @@ class Visit(NamedTuple):
         far, near: times of 40 mm and 8 mm before the first touch [s].
         touch: of the first touch [s].
         leaves: the way out begins [s].
-        out: times of 8 mm and 40 mm after the contact's end [s]; fewer where the recording ends before.
+        out: times of 8 mm and 40 mm after the contact's end, if recorded [s].
     """
 
     place: str
@@ -65,8 +58,7 @@ def visits_of(demonstrations: Sequence[Demonstration]) -> tuple[list[list[Visit]
         Visits by demonstration, and for each visit the scatter of its touch by frame [m]; empty for one demonstration.
 
     Raises:
-        InputError: a demonstration that names no place that the others name, touches nothing, or visits the places in
-            another order than the others.
+        InputError: a demonstration that names no common place, touches nothing, or visits the places in another order.
     """
     places = [places_of(d) for d in demonstrations]
     common = [name for name in places[0] if all(name in each for each in places)]
@@ -81,9 +73,11 @@ def visits_of(demonstrations: Sequence[Demonstration]) -> tuple[list[list[Visit]
     rows = []
     scatters = []
     for k in range(len(touches[0])):
-        points = np.array([_at(d, touch[k][1]) for d, touch in zip(demonstrations, touches, strict=True)])
+        points = np.array(
+            [path_of(d)[index_at(d, touch[k][1])] for d, touch in zip(demonstrations, touches, strict=True)]
+        )
         scatter = scatter_of(points, places, common)
-        if min(scatter.values(), default=0.0) > AGREE_M:
+        if min(scatter.values(), default=0.0) > 0.03:  # larger scatter in every frame is refused
             _refuse_order(demonstrations, touches)
         name = belongs_to(points, places, common, scatter)
         rows.append([(name, start, stop) for _, start, stop in (touch[k] for touch in touches)])
@@ -94,7 +88,7 @@ def visits_of(demonstrations: Sequence[Demonstration]) -> tuple[list[list[Visit]
 
 
 def scatter_of(points: Float, places: Sequence[Mapping[str, Pose]], names: Sequence[str]) -> dict[str, float]:
-    """Scatter of points (D, 3), one of each demonstration, seen from each place and from base [m]."""
+    """Scatter of points (D, 3), one of each demonstration, in each place and in base [m]."""
     if len(points) < 2:
         return {}
     seen = {name: _seen(points, [each[name] for each in places]) for name in names} | {BASE: points}
@@ -118,14 +112,15 @@ def _seen(points: Float, poses: Sequence[Pose]) -> Float:
 def _contacts(
     demonstration: Demonstration, places: Mapping[str, Pose], names: Sequence[str]
 ) -> list[tuple[str, float, float]]:
-    """Nearest place, start and stop of contacts [s], those in a row at one place joined, knocks left out."""
+    """Nearest place, start and stop of contacts [s], joined by place, without knocks."""
     path, found = path_of(demonstration), []
-    for start, stop, peak in audit(demonstration).contacts:
+    for start, stop, peak in contact_evidence(demonstration).contacts:
         point = path[index_at(demonstration, start)]
         name = min(names, key=lambda each: float(norm(point - places[each].position)))
         found.append((name, start, stop, peak * (stop - start)))
     strongest = [max(impulse for each, _, _, impulse in found if each == name) for name in {row[0] for row in found}]
-    least = KNOCK * float(np.median(strongest)) if strongest else 0.0
+    # of the median over places of the strongest contact, as peak force times duration
+    least = 0.1 * float(np.median(strongest)) if strongest else 0.0
     rows: list[tuple[str, float, float]] = []
     for name, start, stop, impulse in found:
         if impulse < least:
@@ -153,27 +148,22 @@ def _refuse_order(
 
 
 def tip_of(demonstration: Demonstration) -> Float:
-    """The point of the tool frame (3,) that touches: its tip, where the metadata name one, else the tool point."""
+    """The touching point of the tool frame (3,): its tip, if named, else the tool point."""
     return demonstration.point(TIP if TIP in demonstration.meta.get("frames", {}) else None)
 
 
 def path_of(demonstration: Demonstration) -> Float:
-    """(T, 3) where that point is, in base [m]."""
+    """(T, 3) path of that point in base [m]."""
     return demonstration.pose.at(tip_of(demonstration)).position
 
 
-def _at(demonstration: Demonstration, time: float) -> Float:
-    result: Float = path_of(demonstration)[index_at(demonstration, time)]
-    return result
-
-
 def index_at(demonstration: Demonstration, time: float) -> int:
-    """The sample at a time [s], or the last one."""
+    """Sample at a time [s], or the last one."""
     return min(int(np.searchsorted(demonstration.time, time)), len(demonstration) - 1)
 
 
 def _next(rows: Sequence[Sequence[tuple[str, float, float]]], k: int, i: int, d: Demonstration) -> tuple[float, float]:
-    """When the contact before ended, and the next one begins [s]."""
+    """End of the contact before, and start of the next one [s]."""
     before = rows[k - 1][i][2] if k else float(d.time[0])
     return before, rows[k + 1][i][1] if k + 1 < len(rows) else float(d.time[-1])
 
@@ -205,9 +195,9 @@ def _first_beyond(away: Float, begin: int, end: int, limit: float) -> int | None
 
 
 def _turns_back(demonstration: Demonstration, path: Float, first: int, last: int, out: int) -> int:
-    """The sample of a visit from which on the tool goes, without a rest, to where it is `NEAR_M` away."""
+    """Sample of a visit from which the tool goes, without rest, to `NEAR_M` away."""
     way = unit(path[out] - path[last])
-    width = max(1, round(SMOOTH_S * demonstration.rate))
+    width = max(1, round(0.1 * demonstration.rate))  # averaging time of a speed
     speed = np.convolve(np.gradient(path @ way, demonstration.time), np.ones(width) / width, "same")
-    resting = np.flatnonzero(speed[first:out] < REST_M_S)
+    resting = np.flatnonzero(speed[first:out] < 0.005)  # limit of a rest
     return first + int(resting[-1]) if resting.size else last

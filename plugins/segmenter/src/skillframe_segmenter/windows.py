@@ -1,11 +1,9 @@
-r"""From a recording to windows of 50 ms: mean velocity, angular velocity, force and torque in each.
+r"""Cut a recording into windows of 50 ms: mean velocity, angular velocity, force and torque.
 
     v_i = (p_{i+1} - p_i) / h,    w_i = log(R_{i+1} R_i^T) / h,    F_i, T_i = mean over the window
 
-where \(p_i, R_i\) are means over half a window on both sides of edge i. Motion enters through differences only, so
-where the task stands cannot matter: positions are taken relative to the first one and rounded to 10 nm, which lets
-nothing of a constant through, not even its rounding. The window is our choice: raw samples make a phase model follow
-noise (100 Hz fails), 10 Hz loses short phases, 20 to 40 Hz are equal.
+where \(p_i, R_i\) are means over half a window on both sides of edge i. Positions are relative to the first one and
+rounded to 10 nm, so that the task's place has no effect. Windows of 10 ms follow noise, of 100 ms lose short phases.
 """
 
 from __future__ import annotations
@@ -17,13 +15,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.demonstration.record import Demonstration, resolve_point
-from skillframe.demonstration.together import common_frames
+from skillframe.document.frame import common_frames
 from skillframe.errors import InputError
-from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, norm, rotate, rotation_vector
+from skillframe.frames import (
+    Float,
+    Pose,
+    continuous,
+    matrix_from_quaternion,
+    move_wrench,
+    norm,
+    rotate,
+    rotation_vector,
+)
 from skillframe_segmenter.settings import WINDOW_S
 
 GRID_M = 1e-8
-FEWEST = 8  # windows; less is no demonstration of anything
+FEWEST = 8  # windows
 
 
 class Windows(NamedTuple):
@@ -33,8 +40,8 @@ class Windows(NamedTuple):
         start: time of the first edge [s]; edge i lies at start + i h.
         motion: (W, 6) velocity and angular velocity [m/s, rad/s].
         wrench: (W, 6) mean wrench of the environment on the tool [N, Nm].
-        position: (W, 3) where the point is [m]; only the pose-driven baseline looks at it.
-        rotation: (W, 3, 3) attitude, likewise.
+        position: (W, 3) of the point [m], for the pose-driven baseline.
+        rotation: (W, 3, 3) orientation, likewise.
     """
 
     start: float
@@ -58,8 +65,8 @@ def windows(demonstration: Demonstration, at: Float, axes: str) -> Windows:
 
     Args:
         demonstration: as read.
-        at: (3,) point of the tool frame whose motion and wrench count.
-        axes: "base", or "phase_start": the tool's attitude at the start of the demonstration.
+        at: (3,) observed point of the tool frame.
+        axes: "base", or "phase_start": the tool's orientation at the start of the demonstration.
 
     Raises:
         InputError: values that are not finite, or a recording too short to have phases.
@@ -69,9 +76,9 @@ def windows(demonstration: Demonstration, at: Float, axes: str) -> Windows:
     pose = Pose(relative, matrix_from_quaternion(demonstration.quaternion))
     point = pose.at(at)
     wrench = move_wrench(demonstration.wrench, rotate(pose.rotation, np.broadcast_to(at, point.position.shape)))
-    values = np.column_stack([point.position, _continuous(demonstration.quaternion), wrench])
+    values = np.column_stack([point.position, continuous(demonstration.quaternion), wrench])
     if not np.all(np.isfinite(values)):
-        raise InputError(where, "holds values that are not finite", "run skillframe demonstration check on it")
+        raise InputError(where, "holds values that are not finite", "run skillframe check on it")
     elapsed = demonstration.time - demonstration.time[0]
     count = int(np.floor(elapsed[-1] / WINDOW_S + 1e-6))
     if count < FEWEST:
@@ -95,15 +102,8 @@ def _cut(elapsed: Float, values: Float, count: int, start: float, first: Float, 
     return Windows(start, np.hstack(parts[:2]), np.hstack(parts[2:]), middle, rotation[1:])
 
 
-def _continuous(quaternion: Float) -> Float:
-    """Quaternions without sign flips from sample to sample."""
-    flips = (quaternion[1:] * quaternion[:-1]).sum(-1) < 0.0
-    result: Float = quaternion * np.concatenate([[1.0], np.where(np.cumsum(flips) % 2, -1.0, 1.0)])[:, None]
-    return result
-
-
 def _bin_means(index: Float, values: Float, count: int) -> Float:
-    """Means of the samples in each of `count` bins. A bin without samples (a gap, a slow clock) is interpolated."""
+    """Means of the samples in each of `count` bins, empty ones interpolated."""
     kept = (index >= 0) & (index < count)
     chosen: NDArray[np.intp] = index[kept].astype(np.intp)
     starts = np.concatenate([[0], np.flatnonzero(np.diff(chosen)) + 1])
@@ -117,7 +117,7 @@ def _bin_means(index: Float, values: Float, count: int) -> Float:
 
 
 def cut_all(demonstrations: Sequence[Demonstration], at: str | None, axes: str) -> tuple[list[Windows], Float]:
-    """Windows of all demonstrations, and the point of the tool frame (3,) that was looked at.
+    """Windows of all demonstrations, and the observed point of the tool frame (3,).
 
     Raises:
         InputError: no demonstration, demonstrations of different tools, or one that cannot be cut.

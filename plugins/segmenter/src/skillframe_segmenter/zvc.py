@@ -1,12 +1,10 @@
-"""Baseline: cut where the tool stands still, or where the contact force comes and goes (zero-velocity crossing).
+"""Baseline segmenter: cuts where the tool rests or contact force changes (zero-velocity crossing).
 
     cut at the middle of a stop:  |v| < 0.15 v_r  and  |w| < 0.15 w_r,  for three windows or more
     cut where |F| crosses the force threshold, if one is given
 
-Speeds are those of windows of 50 ms, smoothed over five; v_r and w_r are the typical ones of `features`. Every interval
-is a phase of its own in each demonstration, counted from its beginning: such a rule knows where something changes, and
-cannot know that two intervals are the same phase. Its policies go on when a phase comes to rest. Standard method; the
-figures are ours.
+Speeds of windows of 50 ms are smoothed over five; v_r and w_r are of `features`. Every interval is a phase of its own,
+since the rule cannot recognise one that recurs.
 """
 
 from __future__ import annotations
@@ -33,7 +31,7 @@ SMOOTHING, SHORTEST = 5, 3
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ZvcSettings:
-    """What the baseline goes by.
+    """Settings of the baseline.
 
     Attributes:
         still: share of the 80th percentile of speed below which the tool stands still.
@@ -67,8 +65,12 @@ def fit(demonstrations: Sequence[Demonstration], phases: int | None, settings: M
 
 def _labels(cut: Windows, settings: ZvcSettings, phases: int | None) -> NDArray[np.intp]:
     at = sorted({*_stops(cut, settings.still), *_crossings(cut, settings.force_n)})
-    strength = {i: _change(cut, i) for i in at}
     if phases is not None:
+        strength, width = dict[int, float](), 6  # change of the mean motion over six windows
+        for i in at:
+            before, after = cut.motion[max(i - width, 0) : i], cut.motion[i : i + width]
+            moved = len(before) and len(after)
+            strength[i] = float(norm(before.mean(axis=0) - after.mean(axis=0))) if moved else 0.0
         at = sorted(sorted(at, key=lambda i: -strength[i])[: phases - 1])
     labels = np.zeros(cut.size, dtype=np.intp)
     for i in at:
@@ -77,7 +79,6 @@ def _labels(cut: Windows, settings: ZvcSettings, phases: int | None) -> NDArray[
 
 
 def _stops(cut: Windows, share: float) -> list[int]:
-    """Middles of stops that are neither the beginning nor the end."""
     typical = typical_speeds([cut], cut)
     speeds = [_smoothed(norm(cut.motion[:, part])) for part in (slice(0, 3), slice(3, 6))]
     still = (speeds[0] < share * typical[0]) & (speeds[1] < share * typical[1])
@@ -94,12 +95,6 @@ def _crossings(cut: Windows, force: float) -> list[int]:
         return []
     touching = runs.without_short((norm(cut.wrench[:, :3]) > force).astype(np.intp), SHORTEST)
     return [int(i) for i in runs.starts_of_runs(touching)[1:]]
-
-
-def _change(cut: Windows, i: int, width: int = 6) -> float:
-    """How different the motion is before and after window i."""
-    before, after = cut.motion[max(i - width, 0) : i], cut.motion[i : i + width]
-    return float(norm(before.mean(axis=0) - after.mean(axis=0))) if len(before) and len(after) else 0.0
 
 
 def _smoothed(values: Float) -> Float:

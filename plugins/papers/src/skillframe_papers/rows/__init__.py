@@ -1,1 +1,1 @@
-"""How each row is computed, a module a subject. `published` names the function of each."""
+"""Computation of the rows, a module for each subject."""

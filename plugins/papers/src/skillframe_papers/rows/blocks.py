@@ -1,6 +1,6 @@
-"""Several skills run side by side in one simulation, each in trials of its own: what takes the time is the ticks.
+"""Several skills side by side in one simulation, whose cost is its ticks.
 
-A trial does not know of its neighbours, so every result is, to the last bit, that of a simulation of one skill alone.
+Trials are independent, so results equal, to the last bit, those of one skill alone.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skillframe.execution.drive import Setup
 from skillframe.execution.executor import simulate
 from skillframe.execution.prepare import prepare
-from skillframe.execution.setup import Setup
 from skillframe.extend.records import Document
 from skillframe.frames import Float, Pose
 from skillframe.robot.model import RobotModel
@@ -22,7 +22,7 @@ from skillframe.world.scene import Scene
 
 
 class Trials(NamedTuple):
-    """Trials of one document: quantities drawn, each (N,), and a generator for each trial."""
+    """Trials of one document: sampled quantities, each (N,), and a generator for each."""
 
     document: Document
     draws: Mapping[str, Float]
@@ -32,23 +32,19 @@ class Trials(NamedTuple):
 def successes(
     robot: RobotModel, scene: Scene, trials: Sequence[Trials], *, duration_s: float, center: str | None = None
 ) -> list[NDArray[np.bool_]]:
-    """Which trials of documents that run side by side succeed. Arguments as `ran`.
-
-    Returns:
-        by document, (N,) each.
-    """
+    """Successes (N,) by document, with the arguments of `ran`."""
     return [each.success for each in ran(robot, scene, trials, duration_s=duration_s, center=center)]
 
 
 class Ended(NamedTuple):
-    """How the trials (N,) of a document ended: which succeeded, and after how long [s]."""
+    """Ends of a document's trials (N,): success, and duration [s]."""
 
     success: NDArray[np.bool_]
     seconds: Float
 
     @property
     def found(self) -> Float:
-        """Seconds (N,) to the success, inf where there was none."""
+        """Seconds (N,) to the success, inf without one."""
         return np.where(self.success, self.seconds, np.inf)
 
 
@@ -58,14 +54,14 @@ def ran(
     """Run documents side by side.
 
     Args:
-        robot: who runs them.
-        scene: where.
-        trials: of each document; all draw the same quantities.
-        duration_s: simulated seconds after which a trial is stopped.
-        center: of compliance, the same for all; None: where each was learned; one simulation for each such point.
+        robot: that runs them.
+        scene: of all.
+        trials: of each document, with the same quantities.
+        duration_s: time limit [simulated s].
+        center: of compliance of all; None: where each was learned, with one simulation for each such point.
 
     Returns:
-        by document, how its trials ended.
+        ends of the trials by document.
     """
     made = [prepare(robot, scene, each.document, center) for each in trials]
     return ran_made(made, [(each.draws, each.rngs) for each in trials], duration_s=duration_s)
@@ -75,15 +71,15 @@ def ran_made(
     made: Sequence[tuple[Skill, Setup]], trials: Sequence[tuple[Mapping[str, Float], Sequence[np.random.Generator]]],
     *, duration_s: float,
 ) -> list[Ended]:  # fmt: skip
-    """Run skills side by side, each with the quantities and generators of its trials.
+    """Run skills side by side, each with its trials' quantities and generators.
 
     Args:
-        made: skills and how they run: the same robot and scene.
-        trials: of each skill; all draw the same quantities.
-        duration_s: simulated seconds after which a trial is stopped.
+        made: skills and setups of the same robot and scene.
+        trials: of each skill, with the same quantities.
+        duration_s: time limit [simulated s].
 
     Returns:
-        by skill, how its trials ended.
+        ends of the trials by skill.
     """
     alike: dict[bytes, list[int]] = {}
     for i, (_, setup) in enumerate(made):
@@ -105,7 +101,7 @@ class Blocks(Skill):
 
     Args:
         skills: in the order of the trials.
-        sizes: how many trials each has.
+        sizes: trials of each.
     """
 
     def __init__(self, skills: Sequence[Skill], sizes: Sequence[int]) -> None:
@@ -122,7 +118,7 @@ class Blocks(Skill):
             skill.start(rows_of(observation, rows), rngs[rows])
 
     def step(self, observation: Observation) -> Command:
-        """What each says of its trials."""
+        """The joined commands."""
         commands = [skill.step(rows_of(observation, rows)) for skill, rows in self._blocks]
         return Command(
             Pose(*(np.concatenate(values) for values in zip(*(c.pose for c in commands), strict=True))),
@@ -134,10 +130,10 @@ class Blocks(Skill):
         )  # fmt: skip
 
     def _gains(self, said: list[Impedance]) -> Impedance:
-        """All gains, the very same arrays as before while each skill says the very same: those are not looked at again.
+        """All gains, the identical arrays while no skill changes its own, which spares the controller a check.
 
         Raises:
-            ValueError: some skills say their damping and some do not.
+            ValueError: only some skills state their damping.
         """
         before, self._said = self._said, said
         if self._all is not None and all(
@@ -153,11 +149,11 @@ class Blocks(Skill):
         return self._all
 
     def journal(self, trial: int) -> list[tuple[float, str]]:
-        """What the trial's own skill says."""
+        """The journal of the trial's skill."""
         skill, rows = next((s, r) for s, r in self._blocks if r.start <= trial < r.stop)
         return skill.journal(trial - rows.start)
 
 
 def _each(matrix: Float, count: int) -> Float:
-    """Gains of each of some trials, of one arm (count, 6, 6) or of several (count, arms, 6, 6)."""
+    """Gains of each trial, of one arm (count, 6, 6) or several (count, arms, 6, 6)."""
     return np.broadcast_to(matrix, (count, *(matrix.shape[1:] if matrix.ndim > 2 else matrix.shape)))

@@ -1,9 +1,9 @@
-r"""The crane in the one loop, for its rows: a desired path of the tool, followed with the first-order impedance.
+r"""Runs of the crane on a desired path of the tool, with first-order impedance.
 
     D (X' - X_d') + K (X - X_d) = f,     X_d(t) given, legs from rest to rest by 10 s^3 - 15 s^4 + 6 s^5
 
-Before a run the loop swings the crane in the air and identifies friction and payload; the plant's masses and frictions
-differ from what the law believes by the draws.
+Before a run the loop swings the crane in the air to identify friction and payload; the plant's masses and frictions
+vary.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from skillframe.frames import Float, Pose
 from skillframe.robot.model import RobotModel
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 from skillframe.world.scene import Geom, Scene, Task, Tool
-from skillframe.world.worlds.common import anywhere, no_error
+from skillframe.world.shapes import anywhere, no_error
 
 Path = Callable[[float], tuple[Float, Float]]
 """Displacement from the start (3,) [m] and its rate at a time [s]."""
@@ -27,12 +27,11 @@ FIXTURE = np.array([3.0, 0.0, 0.0])
 CORNERS = np.array([[2.5, 0.0, 1.0], [3.0, 0.0, 1.5], [3.5, 0.0, 1.0], [3.0, 0.0, 0.5]])
 """The published diamond, in base [m], 5 s a leg."""
 LEG_S = 5.0
-ABOVE, PLATE, RADIUS = 0.95, 0.45, 0.05  # where the tool starts, the plate's top, the tool's sphere [m]
+ABOVE, PLATE, RADIUS = 0.95, 0.45, 0.05  # tool start, plate top, radius of the tool's sphere [m]
 NEAR, NEAR_S, LANDING_S, SLIDING_S = 0.02, 2.5, 3.0, 6.0
-"""The path stops so far above the plate [m], presses on from rest, and then slides [s]: a landing in full swing is
-above the machine's force limit in the simulator."""
+"""The path stops this far above the plate [m], presses from rest, then slides [s], as a landing at speed exceeds the
+force limit."""
 STROKE, SPEED = 0.4, 0.19  # along the plate [m], [m/s]
-FRICTION = 0.3
 
 
 class Stiffness(NamedTuple):
@@ -47,7 +46,7 @@ PRESSING = Stiffness(1.0e5, 5.0e4)
 
 
 class Follow(Skill):
-    """Every trial's tool follows one path of displacements from where it is."""
+    """Follows one path of displacements from the tool's start."""
 
     def __init__(self, path: Path, gains: Stiffness) -> None:
         self._path, self._gains = path, gains
@@ -70,13 +69,13 @@ class Follow(Skill):
 
 
 def blend(s: float) -> tuple[float, float]:
-    """From 0 to 1 from rest to rest, and its rate."""
+    """Blend from 0 to 1 from rest to rest, and its rate."""
     s = min(max(s, 0.0), 1.0)
     return s**3 * (10.0 - 15.0 * s + 6.0 * s**2), 30.0 * s**2 * (1.0 - s) ** 2
 
 
 def diamond(time: float) -> tuple[Float, Float]:
-    """The published path, round and round."""
+    """The published path, repeated."""
     leg = int(time // LEG_S)
     begin, end = CORNERS[leg % 4], CORNERS[(leg + 1) % 4]
     value, rate = blend(time / LEG_S - leg)
@@ -84,7 +83,7 @@ def diamond(time: float) -> tuple[Float, Float]:
 
 
 def press_and_slide(depth: float) -> Path:
-    """Down to near the plate, on until the desired tool is `depth` below its top [m], then to and fro along it."""
+    """Down to near the plate, on until the desired tool is `depth` below its top [m], then to and fro."""
     above = ABOVE - PLATE - RADIUS - NEAR
 
     def place(time: float) -> Float:
@@ -101,7 +100,7 @@ def press_and_slide(depth: float) -> Path:
 
 
 def scene(start: Float, *, plate: bool) -> Scene:
-    """A sphere at the tool, over a plate or in the air. `start` in base [m]."""
+    """A sphere at the tool, over a plate or in the air, from `start` in base [m]."""
     tool = Tool(
         geoms=(Geom(kind="sphere", size=(RADIUS,)),), mass=1e-3, center_of_mass=(0.0, 0.0, 0.0),
         inertia=(1e-6, 1e-6, 1e-6), frames={"tip": (0.0, 0.0, 0.0)},
@@ -109,7 +108,7 @@ def scene(start: Float, *, plate: bool) -> Scene:
     slab = Geom(kind="box", size=(2.0, 0.5, 0.1), position=(0.0, 0.0, PLATE - 0.1))
     x, y, z = (float(value) for value in start - FIXTURE)
     return Scene(
-        name="plate", fixture=(slab,) if plate else (), tool=tool, friction=FRICTION, start_tip=(x, y, z),
+        name="plate", fixture=(slab,) if plate else (), tool=tool, friction=0.3, start_tip=(x, y, z),
         start_quaternion=(0.0, 0.0, 0.0, 1.0), goal=anywhere, goal_error=no_error, task=Task(direction=None),
     )  # fmt: skip
 
@@ -118,7 +117,7 @@ def run(
     path: Path, gains: Stiffness, where: Scene, draws: Mapping[str, Float], *, seconds: float, seed: int,
     trace_hz: float = 100.0, robot: RobotModel | None = None,
 ) -> Result:  # fmt: skip
-    """The crane, or another one, on a path, a trial per draw."""
+    """Run a crane on a path, a trial per sample."""
     count = len(next(iter(draws.values())))
     robot = robot or load_robot_model("hiab_xs031")
     setup = Setup(robot=robot, scene=where, center_of_compliance=np.zeros(3))

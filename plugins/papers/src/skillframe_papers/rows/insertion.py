@@ -1,8 +1,8 @@
-"""The two-arm insertion over tilts, joint friction, configurations and postures: the table of the two-arm paper.
+"""Two-arm insertions over tilts, joint friction, configurations and postures (two-arm paper).
 
-'+' turns the peg about the fixture's y axis (level, across the insertion): its tip end moves up. Postures: "upright",
-both arms on the floor; "mirrored", the arm that holds the hole mirrored at the level plane through the insertion axis,
-so that it hangs. (Mirroring both arms is reversing the sign of the tilt, gravity being compensated.)
+'+' turns the peg about the fixture's level y axis, tip end up. "upright": both arms on the floor; "mirrored": the arm
+with the hole mirrored at the level plane through the insertion axis, hanging. (Mirroring both arms reverses the tilt,
+as gravity is compensated.)
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from skillframe_dualarm.dual_peg import REACH
 from skillframe_dualarm.runtime import DualArm
 
 from skillframe.errors import UnknownName
-from skillframe.execution.arms import ArmsResult, simulate_arms
-from skillframe.execution.executor import Setup
+from skillframe.execution.executor import Setup, simulate
+from skillframe.execution.result import ArmsResult
 from skillframe.frames import Float, rotate
 from skillframe.robot.model import RobotModel
 from skillframe.world.placement import nominal_fixture
 from skillframe.world.scene import Scene
 from skillframe_papers.rows.blocks import Blocks
-from skillframe_papers.rows.outcome import classify
 
 POSTURES = ("upright", "mirrored")
+CLASSES = ("success", "jam", "common rotation", "turned away")
 Arms = tuple[float, float]
 PUBLISHED = {
     "A": {"largest_deg": 4.0}, "B": {"largest_deg": 12.0, "time_s": 26.5}, "C": {"largest_deg": 0.0},
     "D": {"largest_deg": 8.0, "time_s": 13.0}, "E": {"largest_deg": 12.0, "time_s": 5.0},
 }  # fmt: skip
-"""Table I and times from 8 degrees. C failed at 4 degrees, the smallest tried."""
+"""Table I and times from 8 degrees; C failed at 4 degrees, the smallest tried."""
 MOTION: dict[str, tuple[Arms, Arms, Arms]] = {
     "B": ((1.45, 0.0), (1.18, 0.0), (1.1, 0.0)),
     "D": ((0.64, 0.35), (0.53, 0.23), (0.47, 0.19)),
@@ -81,7 +81,7 @@ def posed(robot: RobotModel, scene: Scene, posture: str) -> tuple[RobotModel, Sc
     height = robot.spec.workspace.fixture[2]
     half_turn = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array([0.0, 0.0, 2.0 * height]))
     model.jointPlacements[first] = half_turn * model.jointPlacements[first]
-    turned_grip = replace(scene.holder, quaternion=(0.0, 0.0, 1.0, 0.0))  # the hole is round: its grip may be, too
+    turned_grip = replace(scene.holder, quaternion=(0.0, 0.0, 1.0, 0.0))  # the hole is round, so its grip may turn
     return replace(robot, model=model), replace(scene, holder=turned_grip)
 
 
@@ -92,16 +92,16 @@ def raised(robot: RobotModel, height_m: float) -> RobotModel:
 
 
 def sticking(robot: RobotModel, arm: int) -> RobotModel:
-    """The robot with joint friction in one arm alone: 0, the master, or 1, the slave."""
+    """The robot with joint friction in one arm: 0 master, 1 slave."""
     other = robot.spec.arm[1 - arm].name
     none = {name: 0.0 for name in robot.model.names if name.startswith(f"{other}_")}
     return replace(robot, spec=replace(robot.spec, friction_share={**robot.spec.friction_share, **none}))
 
 
 def link_weights(robot: RobotModel) -> Float:
-    """Weight (2, J) of each joint: length of the chain from it to the flange over that of the whole chain.
+    """Weight (2, J) of each joint: its distance to the flange over the whole chain's length.
 
-    The paper says "weighted by link length" and no more; this is our reading. Both arms are alike.
+    This is a reading of the paper's "weighted by link length".
     """
     model, found = robot.model, []
     for frame in robot.tool_frames:
@@ -117,7 +117,7 @@ def insert(
     robot: RobotModel, scene: Scene, phase: Phase, tilts_deg: Sequence[float], frictions: Sequence[float],
     *, posture: str = "upright", seed: int = 0, duration_s: float = 30.0, to_the_bottom: bool = False,
 ) -> list[Row]:  # fmt: skip
-    """Insertions of every friction and tilt, frictions first. Arguments as `side_by_side`."""
+    """Insertions of every friction and tilt, frictions first, with the arguments of `side_by_side`."""
     asked = [Asked(phase, tilts_deg, frictions)]
     return side_by_side(
         robot, scene, asked, posture=posture, seed=seed, duration_s=duration_s, to_the_bottom=to_the_bottom
@@ -125,14 +125,14 @@ def insert(
 
 
 def at_start(tilt_rad: Float) -> dict[str, Float]:
-    """Quantities of a pair whose peg starts tilted, and its arm with it: what is commanded goes along the peg."""
+    """Quantities of a pair whose peg and arm start tilted, with commands along the peg."""
     return {"start.tilt_y": tilt_rad}
 
 
 def in_the_grasp(tilt_rad: Float) -> dict[str, Float]:
-    """Of a pair whose peg sits askew in the master's grip, its tip in its place: the arm goes along the hole.
+    """Quantities of a pair whose peg is tilted in the grasp, its tip in place, the arm along the hole.
 
-    The grip is turned about the wrist, so that it is moved by as much as the tip would go.
+    The grasp turns about the wrist, hence the offsets.
     """
     return {
         "grasp.tilt_y": tilt_rad, "grasp.offset_x": -REACH * np.sin(tilt_rad),
@@ -152,22 +152,22 @@ def side_by_side(
     robot: RobotModel, scene: Scene, asked: Sequence[Asked], *, posture: str = "upright", seed: int = 0,
     duration_s: float = 30.0, to_the_bottom: bool = False, tilted: Callable[[Float], dict[str, Float]] = at_start,
 ) -> list[list[Row]]:  # fmt: skip
-    """Insertions, those about the same points in one simulation: each is, to the last bit, what it is alone.
+    """Insertions side by side where points agree, bitwise equal to separate ones.
 
-    Each ends where the goal is reached, 10 mm above the bottom, or, with `to_the_bottom`, where the skill ends.
+    Each ends at the goal, 10 mm above the bottom, or with its skill.
 
     Args:
         robot: of two arms.
-        scene: what they put together.
-        asked: phases, and from where.
+        scene: parts to assemble.
+        asked: phases with their tilts and frictions.
         posture: of `POSTURES`.
         seed: of the sensors' noise.
-        duration_s: after which an insertion has failed.
-        to_the_bottom: see above.
-        tilted: quantities of tilts [rad]: how they come about.
+        duration_s: time limit.
+        to_the_bottom: end with the skill.
+        tilted: quantities of tilts [rad].
 
     Returns:
-        by what was asked, its rows.
+        rows by entry of `asked`.
     """
     robot, scene = posed(robot, scene, posture)
     alike: dict[bytes, list[int]] = {}
@@ -184,7 +184,9 @@ def side_by_side(
         draws = {**tilted(np.radians(tilt)), "robot.joint_friction": friction}
         rngs = [np.random.default_rng([seed, i]) for pair in pairs for i in range(len(pair))]
         skill = Blocks([DualArm(asked[i].phase) for i in which], [len(pair) for pair in pairs])
-        rows = iter(rows_of(simulate_arms(skill, setup, draws, rngs, duration_s=duration_s), robot, tilt, friction))
+        result = simulate(skill, setup, draws, rngs, duration_s=duration_s)
+        assert isinstance(result, ArmsResult)
+        rows = iter(rows_of(result, robot, tilt, friction))
         found |= {i: list(islice(rows, len(pair))) for i, pair in zip(which, pairs, strict=True)}
     return [found[i] for i in range(len(asked))]
 
@@ -194,8 +196,27 @@ def _points(phase: Phase) -> Float:
     return np.array([arm.center_of_compliance for arm in phase.arms])
 
 
+def classify(result: ArmsResult, tilt_rad: Float, axis: Float) -> list[str]:
+    """One of `CLASSES` per trial, by the turns theta_1, theta_2 of the tools about the tilt axis.
+
+    The pair turned by (theta_1 + theta_2) / 2 and the arms relative to each other by theta_1 - theta_2. The paper's
+    classes are (a) jamming, (b) success and (c) both arms rotating the wrong way, here split into together and apart.
+
+    Args:
+        result: of a two-arm run.
+        tilt_rad: (N,) tilt of the tool at the start.
+        axis: (3,) unit vector of the tilt in base.
+    """
+    turned = result.turned_rad @ axis  # (N, 2)
+    common, relative = turned.mean(-1), turned[:, 0] - turned[:, 1]
+    away = result.final_error_rad - np.abs(tilt_rad) > np.radians(3.0)
+    together = (np.abs(common) > np.radians(5.0)) & (np.abs(common) > np.abs(relative))
+    names = np.where(together, "common rotation", np.where(away, "turned away", "jam"))
+    return [str(name) for name in np.where(result.success, "success", names)]
+
+
 def rows_of(result: ArmsResult, robot: RobotModel, tilt_deg: np.ndarray, friction: np.ndarray) -> list[Row]:
-    """The result as rows. Tilts are about the fixture's y axis."""
+    """The result as rows, tilts about the fixture's y axis."""
     axis = rotate(nominal_fixture(robot).rotation, np.array([0.0, 1.0, 0.0]))
     outcome = classify(result, np.radians(tilt_deg), axis)
     turned, ways = np.degrees(result.turned_rad @ axis), result.joint_path_rad
@@ -216,7 +237,7 @@ def _arms(values: Float) -> Arms:
 
 
 def largest(rows: Sequence[Row], sign: int, friction: float) -> float:
-    """Largest tilt [deg] of a sign up to which every insertion succeeds, or 0 if the smallest one fails."""
+    """Largest tilt [deg] of a sign up to which all succeed, or 0."""
     reached = 0.0
     for row in sorted(rows, key=lambda r: abs(r.tilt_deg)):
         if row.joint_friction == friction and row.tilt_deg * sign > 0.0:

@@ -1,50 +1,50 @@
-"""Row 40 of the papers' results: a skill is learned where nobody measures the wrench.
+"""Row 40: a skill learned without a force sensor.
 
-The two-arm paper takes the wrench from what the arm's own controller commands. So does this row: people teach by
-teleoperation, and the learner gets the law's wrench, reversed. What accelerates the tool and what rubs in the joints is
-in it, too: a Panda with friction in its joints in the valley, and a tool without joints on the hump, where every mean
-of the motion is a push that does not pass. Nulls: the same demonstrations without a wrench, and with the mean motion
-for a push, which the hump tells apart. Beside them stands what is learned with a sensor, on the same seeds.
+As in the two-arm paper, the wrench is the controller's command, reversed, with inertia and joint friction in it: a
+Panda with joint friction in the valley, and a tool without joints on the hump, where no mean of the motion is a push
+that passes. Nulls: no wrench, and the mean motion as push. Beside them: a sensor, on the same seeds.
 """
 
 from __future__ import annotations
 
-import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+from skillframe_teaching.teacher import TeacherSettings
 
-from skillframe.demonstration.record import Demonstration
-from skillframe.document.source import learned
-from skillframe.errors import InputError
-from skillframe.execution.prepare import load_robot_model, load_world
-from skillframe.extend.records import Document, LearnOptions, RowResult, RowRun
-from skillframe.extend.registry import registry
+from skillframe.execution.prepare import load_world
+from skillframe.extend.records import Document, RowResult, RowRun
 from skillframe.frames import Float
-from skillframe.teaching.sessions import record
-from skillframe.teaching.teacher import TeacherSettings
-from skillframe_papers.bars import ahead, counted, judged, together
 from skillframe_papers.rows import nulls
-from skillframe_papers.rows.blocks import Trials, successes
-from skillframe_papers.rows.skills import Ran
+from skillframe_papers.rows.harness import (
+    HEAD,
+    Ran,
+    TaughtSet,
+    changed,
+    compared,
+    executed,
+    leads,
+    lines,
+    lmc_if_any,
+    seeds,
+    shown,
+    successes,
+)
 
-SEED, EACH = 75_000, 2
-SETS, QUICK_SETS = 8, 1
-SHARE, LONGEST_S = 0.9, 12.0
 OURS, SENSED = "what the controller commands", "a sensor"
 NONE, MOTION = "no wrench", "the same, pushed along the mean motion"
 
 
 class Task(NamedTuple):
-    """A world, its friction, who is taught and runs there, and from where along x [m].
+    """A world with its friction, robot and starts.
 
     Attributes:
         world, friction: of the parts.
         robot: taught and run.
         rubs: whether there are joints with friction.
-        offsets: where runs start along x [m].
+        offsets: starts of runs along x [m].
         motion: whether the mean motion is a push that does not pass.
     """
 
@@ -61,100 +61,65 @@ TASKS = {
     "hump, free tool": Task("hump", 0.1, "free_tool", False, (-0.025, -0.01, 0.0, 0.018), True),
 }
 
-QUICK_TASKS = ("hump, free tool",)
-
-
-def _taught(given: Sequence[Demonstration]) -> Document | None:
-    """What is learned, or None where the learner refuses."""
-    try:
-        return learned(registry().skill("lmc"), list(given), LearnOptions())
-    except InputError:  # a refusal teaches nothing
-        return None
-
 
 def along(document: Document, push: Float) -> Document:
-    """The document with another push (3,) in base, at the same speed or the learner's largest, stiff along it."""
-    made = copy.deepcopy(dict(document))
-    part = made["phases"][0]["translation"]
+    """The document with another push (3,) in base, stiff along it, at the same or the largest speed."""
+    part = document["phases"][0]["translation"]
     across = np.eye(3) - np.outer(push, push)
     free = [across @ np.array(axis) for axis in part["compliant_axes"]]
     axes = [axis / np.linalg.norm(axis) for axis in free if np.linalg.norm(axis) > 0.5]
     stiffness = 1000.0 * (np.eye(3) - sum((np.outer(axis, axis) for axis in axes), np.zeros((3, 3))))
-    part |= {"desired_direction": push.tolist(), "speed": part["speed"] or 0.02, "fully_compliant": False,
-             "compliant_axes": [axis.tolist() for axis in axes], "stiffness": stiffness.tolist()}  # fmt: skip
-    return made
+    return changed(document, translation={
+        "desired_direction": push.tolist(), "speed": part["speed"] or 0.02, "fully_compliant": False,
+        "compliant_axes": [axis.tolist() for axis in axes], "stiffness": stiffness.tolist(),
+    })  # fmt: skip
 
 
-def _documents(job: RowRun, task: Task, index: int) -> dict[str, Document | None]:
-    """By where the wrench came from, what one person's demonstrations teach."""
-    scene, seed = load_world(task.world, {"friction": task.friction}), SEED + 1000 * job.seed + index
+def _taught(job: RowRun, task: Task, seed: int) -> TaughtSet:
+    """Two demonstrations, learned from in all ways."""
+    friction = {"robot.joint_friction": float(job.settings["robot.joint_friction"])} if task.rubs else {}
+    scene = load_world(task.world, {"friction": task.friction})
     person = TeacherSettings(kind="teleoperation", delay_s=job.settings["teacher.delay_s"])
-
-    def shown(sensed: bool) -> list[Demonstration]:
-        return record(
-            load_robot_model(task.robot), scene, person, count=EACH, seed=seed, draws=_friction(job, task),
-            duration_s=20.0, sensed=sensed,
-        ).demonstrations  # fmt: skip
-
-    felt = shown(False)
-    blind = [replace(each, wrench=np.zeros_like(each.wrench)) for each in felt]
-    ours, without = _taught(felt), _taught(blind)
-    motion = None if ours is None else along(ours, nulls.pushes(felt)["mean motion"])
-    given = {OURS: ours, NONE: without, MOTION: motion}
-    return given if job.quick else {**given, SENSED: _taught(shown(True))}
-
-
-def _friction(job: RowRun, task: Task) -> dict[str, float]:
-    return {"robot.joint_friction": float(job.settings["robot.joint_friction"])} if task.rubs else {}
-
-
-def _executed(job: RowRun, name: str) -> dict[str, Ran]:
-    """Successes by where the wrench came from, set and start."""
-    task, sets = TASKS[name], range(job.count(SETS, QUICK_SETS))
-    scene, count = load_world(task.world, {"friction": task.friction}), len(task.offsets)
-    draws = {"start.offset_x": np.array(task.offsets)}
-    draws |= {key: np.full(count, value) for key, value in _friction(job, task).items()}
-    found = {(way, i): each for i in sets for way, each in _documents(job, task, i).items()}
-    runs = {
-        key: Trials(each, draws, [np.random.default_rng([SEED, k]) for k in range(count)])
-        for key, each in found.items() if each is not None
+    felt, *sensed = (
+        shown(scene, person, count=2, seed=seed, robot=task.robot, draws=friction, duration_s=20.0, sensed=sensed)
+        for sensed in ((False,) if job.quick else (False, True))
+    )
+    ours = lmc_if_any(felt)
+    ways = {
+        OURS: ours, NONE: lmc_if_any([replace(each, wrench=np.zeros_like(each.wrench)) for each in felt]),
+        MOTION: None if ours is None else along(ours, nulls.pushes(felt)["mean motion"]),
     }  # fmt: skip
-    done = successes(load_robot_model(task.robot), scene, list(runs.values()), duration_s=LONGEST_S)
-    won = dict(zip(runs, done, strict=True))
-    lost = np.zeros(count, dtype=bool)
-    ways = dict.fromkeys(way for way, _ in found)
-    result = {way: Ran(np.array([won.get((way, i), lost) for i in sets])) for way in ways}
-    job.tell(f"{name}: {', '.join(f'{way} {each.hits} of {each.trials}' for way, each in result.items())}")
-    return result
+    if sensed:
+        ways[SENSED] = lmc_if_any(sensed[0])
+    draws = {"start.offset_x": np.array(task.offsets)}
+    draws |= {key: np.full(len(task.offsets), value) for key, value in friction.items()}
+    return TaughtSet(ways, draws, (75_000,))
 
 
 def commanded(job: RowRun) -> RowResult:
-    """Row 40: skills learned from the wrench that the arm's own law commands, run where they were taught."""
-    return _told(job, {name: _executed(job, name) for name in (QUICK_TASKS if job.quick else TASKS)})
+    """Row 40: skills learned from the wrench that the arm's own controller commands, run where they were taught."""
+    found = {}
+    for name in ("hump, free tool",) if job.quick else TASKS:
+        task, scene = TASKS[name], load_world(TASKS[name].world, {"friction": TASKS[name].friction})
+        sets = [_taught(job, task, seed) for seed in seeds(job, 75_000, job.count(8, 1))]
+        found[name] = successes(executed(job, scene, sets, robot=task.robot, duration_s=12.0))
+    return result(job, found)
 
 
-def _told(job: RowRun, found: Mapping[str, Mapping[str, Ran]]) -> RowResult:
-    """The row, from successes by world and by where the wrench came from."""
-    ours = {name: each[OURS] for name, each in found.items()}
-    shares = [judged(each.hits, each.trials, SHARE, quick=job.quick) for each in ours.values()]
-    pairs = [
-        (ours[name], each[null])
-        for name, each in found.items() for null in ((NONE, MOTION) if TASKS[name].motion else (NONE,))
-    ]  # fmt: skip
-    beside = all(ahead(a.hits, b.hits, a.trials, quick=job.quick) for a, b in pairs)
+def result(job: RowRun, found: Mapping[str, Mapping[str, Ran]]) -> RowResult:
+    """Row 40 of runs by task and source of the wrench."""
+    nulls = [(each[OURS], each[NONE]) for each in found.values()]
+    nulls += [(each[OURS], each[MOTION]) for name, each in found.items() if TASKS[name].motion]
     return RowResult(
         ours="; ".join(
-            f"{name} {counted(each.hits, each.trials)}, without a wrench {found[name][NONE].hits}"
-            + (f", with a sensor {found[name][SENSED].hits}" if SENSED in found[name] else "")
-            for name, each in ours.items()
+            f"{name} {each[OURS]}, without a wrench {each[NONE].hits}"
+            + (f", with a sensor {each[SENSED].hits}" if SENSED in each else "")
+            for name, each in found.items()
         ),
-        verdict=together(shares, beside),
-        values={name.split(",")[0]: each.hits / each.trials for name, each in ours.items()},
-        head=("world", "wrench from", "runs", "sets without a failure"),
-        rows=[
-            (name, way, counted(each.hits, each.trials), each.sets)
-            for name, ways in found.items() for way, each in ways.items()
-        ],
+        verdict=compared(job, [each[OURS] for each in found.values()], all(leads(job, *pair) for pair in nulls)),
+        values={name.split(",")[0]: each[OURS].share for name, each in found.items()},
+        head=("world", "wrench from", "runs", HEAD[-1]),
+        rows=[(name, *line) for name, ways in found.items() for line in lines(ways)],
         difference="The paper teaches two arms a peg, which leads the motion: its mean needs no wrench (row 5). "
         "In the valley the mean motion passes, too. The free tool has no joints that rub.",
     )  # fmt: skip

@@ -1,124 +1,84 @@
-"""Rows 27 to 30 of the papers' results: learned skills executed, and where a compliant push must turn about.
+"""Rows 27 to 30 and 37: learned skills executed, and the centre of a compliant rotation.
 
-Each skill runs from starts spread over what was shown, beside the same push with what the row claims taken away. Draws
-of one set of demonstrations share their learned push and mostly stand or fall together: sets are counted, too.
+Each skill runs from starts spread over the demonstrated ones, beside the same push without the claimed property.
 """
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping, Sequence
 from functools import cache
-from math import radians
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.document.file import new_document
-from skillframe.document.source import learned
-from skillframe.execution.prepare import load_robot_model, load_world
-from skillframe.extend.records import Document, LearnOptions, RowResult, RowRun
+from skillframe.extend.records import Document, RowResult, RowRun
 from skillframe.extend.registry import registry
-from skillframe.teaching.sessions import record
-from skillframe.teaching.teacher import TeacherSettings
-from skillframe_papers.bars import ahead, counted, judged, together
-from skillframe_papers.rows.blocks import Trials, successes
+from skillframe_papers.bars import no_better
+from skillframe_papers.rows.harness import (
+    HEAD,
+    Key,
+    Ran,
+    TaughtSet,
+    compared,
+    executed,
+    key_of,
+    leads,
+    lines,
+    lmc,
+    not_behind,
+    shown,
+    stiff,
+    successes,
+    teacher,
+    world,
+)
 
-SEED = 64_000
-SETS, QUICK_SETS = 6, 1
-SHARE = 0.9
-LONGEST_S, QUICK_LONGEST_S = 15.0, 6.0
-REACH_M, SPREAD_DEG = 0.06, 8.0
+REACH_M, SPREAD_DEG = 0.06, 8.0  # starts of runs: aside of the valley's bottom, and tilted
 TILTS_DEG = (4.0, 8.0, 12.0)
 WRIST, TIP = [0.0, 0.0, 0.0], [0.0, 0.0, 0.2]
-STIFF_N_M, STIFF_NM_RAD, STIFF_TURN_NM_RAD = 1000.0, 20.0, 100.0
-
-
-class Ran(NamedTuple):
-    """Successes of trials, by set and start."""
-
-    success: NDArray[np.bool_]
-
-    @property
-    def hits(self) -> int:
-        """Of all trials."""
-        return int(self.success.sum())
-
-    @property
-    def trials(self) -> int:
-        """How many."""
-        return int(self.success.size)
-
-    @property
-    def sets(self) -> str:
-        """Sets whose every trial succeeded."""
-        return f"{int(self.success.all(axis=1).sum())} of {len(self.success)}"
-
-
-Key = tuple[tuple[str, float], ...]
+STIFF_N_M, STIFF_TURN_NM_RAD = 1000.0, 100.0
 
 
 @cache
-def _shown(key: Key, seed: int, count: int, world: str) -> tuple[Demonstration, ...]:
-    """Demonstrations from the world's starts in turn."""
-    values = dict(key)
-    scene = load_world(world, {"friction": values["world.friction"]})
-    person = TeacherSettings(aim_noise=radians(values["teacher.aim_noise_deg"]))
-    return tuple(record(load_robot_model("free_tool"), scene, person, count=count, seed=seed).demonstrations)
+def _shown(key: Key, seed: int, count: int, name: str) -> tuple[Demonstration, ...]:
+    job = RowRun(settings=dict(key))
+    return tuple(shown(world(job, name), teacher(job), count=count, seed=seed))
 
 
 @cache
-def _learned(key: Key, seed: int, sets: int, world: str, each: int) -> tuple[Document, ...]:
-    """A skill from each set of two demonstrations, from `each` of them."""
-    given, kind = _shown(key, seed, 2 * sets, world), registry().skill("lmc")
-    return tuple(learned(kind, given[2 * i : 2 * i + each], LearnOptions()) for i in range(sets))
+def _learned(key: Key, seed: int, sets: int, name: str, each: int) -> tuple[Document, ...]:
+    given = _shown(key, seed, 2 * sets, name)
+    return tuple(lmc(given[2 * i : 2 * i + each]) for i in range(sets))
 
 
-def skills_of(job: RowRun, world: str, each: int = 2, first: int = SEED) -> tuple[Document, ...]:
-    """A skill from each set of demonstrations: `each` of two, with a seed from `first` on."""
-    key = tuple(sorted(job.settings.items()))
-    return _learned(key, first + job.seed, job.count(SETS, QUICK_SETS), world, each)
+def skills_of(job: RowRun, name: str, each: int = 2, first: int = 64_000) -> tuple[Document, ...]:
+    """A skill from each set: `each` of two demonstrations, with seeds from `first` on."""
+    return _learned(key_of(job), first + job.seed, job.count(6, 1), name, each)
 
 
 def run(
-    job: RowRun, world: str, given: Mapping[str, Sequence[Document]], starts: Mapping[str, Sequence[float]], robot: str,
+    job: RowRun, name: str, given: Mapping[str, Sequence[Document]], starts: Mapping[str, Sequence[float]], robot: str,
     center: str | None = None,
 ) -> dict[str, Ran]:  # fmt: skip
-    """Every document from every start, by the name of what it is."""
-    scene = load_world(world, {"friction": job.settings["world.friction"]})
-    draws = {name: np.array(values) for name, values in starts.items()}
-    count = len(next(iter(draws.values())))
-    trials = [
-        Trials(each, draws, [np.random.default_rng([job.seed, i]) for i in range(count)])
-        for documents in given.values() for each in documents
-    ]  # fmt: skip
-    longest = QUICK_LONGEST_S if job.quick else LONGEST_S
-    done = iter(successes(load_robot_model(robot), scene, trials, duration_s=longest, center=center))
-    return {name: Ran(np.array([next(done) for _ in documents])) for name, documents in given.items()}
+    """Results of every document from every start, by name."""
+    draws = {quantity: np.array(values) for quantity, values in starts.items()}
+    sets = [TaughtSet({way: each}, draws, (job.seed,)) for way, documents in given.items() for each in documents]
+    longest = 6.0 if job.quick else 15.0
+    return successes(executed(job, world(job, name), sets, robot=robot, duration_s=longest, center=center))
 
 
-def stiff(document: Document, part: str, stiffness: float) -> Document:
-    """The document with one part ("translation", "rotation") as stiff in every direction."""
-    made = copy.deepcopy(dict(document))
-    for phase in made["phases"]:
-        phase[part] |= {
-            "stiffness": (stiffness * np.eye(3)).tolist(), "compliant_axes": [], "fully_compliant": False,
-        }  # fmt: skip
-    return made
-
-
-def _judged(job: RowRun, found: Mapping[str, Ran], null: str, words: str, difference: str) -> RowResult:
-    """The first method's share against the bar, and its lead over a null."""
-    ours = next(iter(found.values()))
-    share = judged(ours.hits, ours.trials, SHARE, quick=job.quick)
-    beside = ahead(ours.hits, found[null].hits, ours.trials, quick=job.quick)
+def result(job: RowRun, found: Mapping[str, Ran], words: str, difference: str) -> RowResult:
+    """The first method's share against the threshold, and its lead over the others, its nulls."""
+    (_, ours), *others = found.items()
+    level_with = not_behind(job, ours, dict(others))
+    nulls = ", ".join(f"{name} {each}" for name, each in others)
     return RowResult(
-        ours=f"{counted(ours.hits, ours.trials)} {words}; null: {null}, {found[null].hits}",
-        verdict=together([share], beside), difference=difference, head=("skill", "trials", "sets without a failure"),
-        rows=[(name, counted(each.hits, each.trials), each.sets) for name, each in found.items()],
-        values={"share": ours.hits / ours.trials},
+        ours=f"{ours} {words}; nulls: {nulls}{no_better(level_with)}",
+        verdict=compared(job, [ours], not level_with), difference=difference, head=HEAD, rows=lines(found),
+        values={"share": ours.share},
     )  # fmt: skip
 
 
@@ -126,29 +86,25 @@ def region(job: RowRun) -> RowResult:
     """Row 27: learned pushes from starts all over the valley."""
     offsets = np.linspace(-REACH_M, REACH_M, job.count(13, 5)).tolist()
     skills, starts = skills_of(job, "valley"), {"start.offset_x": offsets}
-    none = "the same pushes, stiff"
     given = {
-        "learned": skills, none: [stiff(s, "translation", STIFF_N_M) for s in skills],
-        **({} if job.quick else {"by hand: straight down, free across": [by_hand()]}),
+        "learned": skills, "the same pushes, stiff": [stiff(s, "translation", STIFF_N_M) for s in skills],
+        "by hand: straight down, free across": [by_hand()],
     }  # fmt: skip
     found = run(job, "valley", given, starts, "free_tool")
-    return _judged(
-        job, found, none, f"runs from {len(offsets)} starts within {1e3 * REACH_M:g} mm of the bottom reach it",
-        "Demonstrations start 40 mm to either side. The push by hand shows that here compliance does it, and that "
-        "whoever knows the valley needs no demonstration.",
+    return result(
+        job, found, f"runs from {len(offsets)} starts within {1e3 * REACH_M:g} mm of the bottom reach it",
+        "Demonstrations start 40 mm to either side. The push by hand, run once from each start, shows that here "
+        "compliance does it, and that whoever knows the valley needs no demonstration.",
     )  # fmt: skip
 
 
-def _tilts(job: RowRun) -> dict[str, list[float]]:
-    return {"start.tilt_y": np.radians(np.linspace(-SPREAD_DEG, SPREAD_DEG, job.count(5, 2))).tolist()}
-
-
-STIFF_TURN = "the same, stiff in rotation"
+def _tilts(count: int) -> dict[str, list[float]]:
+    return {"start.tilt_y": np.radians(np.linspace(-SPREAD_DEG, SPREAD_DEG, count)).tolist()}
 
 
 @cache
 def _pegs(key: Key, seed: int, quick: bool) -> dict[int, dict[str, Ran]]:
-    """By number of demonstrations: pegs learned from so many and run by an arm, and the same with a stiff attitude.
+    """By number of demonstrations: pegs learned and run by an arm, and the same with stiff orientation.
 
     All turn about their tips, and run side by side.
     """
@@ -157,10 +113,10 @@ def _pegs(key: Key, seed: int, quick: bool) -> dict[int, dict[str, Ran]]:
     for each in (1, 2):
         skills = skills_of(job, "peg_in_hole", each)
         given |= {f"learned from {each}": skills, f"{each}": [stiff(s, "rotation", STIFF_TURN_NM_RAD) for s in skills]}
-    hand = {} if quick else {"by hand: straight down, free along x, turning about y": [by_hand(turn="y")]}
-    found = run(job, "peg_in_hole", given | hand, _tilts(job), "panda", "tip")
+    hand = {"by hand: straight down, free along x, turning about y": [by_hand(turn="y")]}
+    found = run(job, "peg_in_hole", given | hand, _tilts(job.count(5, 2)), "panda", "tip")
     return {
-        each: {f"learned from {each}": found[f"learned from {each}"], STIFF_TURN: found[f"{each}"]}
+        each: {f"learned from {each}": found[f"learned from {each}"], "the same, stiff in rotation": found[f"{each}"]}
         | {name: found[name] for name in hand}
         for each in (1, 2)
     }
@@ -168,25 +124,25 @@ def _pegs(key: Key, seed: int, quick: bool) -> dict[int, dict[str, Ran]]:
 
 def peg(job: RowRun) -> RowResult:
     """Row 28: pegs learned from two demonstrations, inserted by an arm from varying starting orientation."""
-    found = _pegs(tuple(sorted(job.settings.items())), job.seed, job.quick)[2]
-    return _judged(
-        job, found, STIFF_TURN, f"runs of a Panda insert from tilts within {SPREAD_DEG:g} degrees",
-        "Learned with a free tool from +8 and -8 degrees, steered about the tip.",
+    return result(
+        job, _pegs(key_of(job), job.seed, job.quick)[2],
+        f"runs of a Panda insert from tilts within {SPREAD_DEG:g} degrees",
+        "Learned with a free tool from +8 and -8 degrees, steered about the tip. The push by hand runs once from each "
+        "start.",
     )  # fmt: skip
 
 
 def single(job: RowRun) -> RowResult:
     """Row 29: the same from one demonstration, which started from one side."""
-    found = _pegs(tuple(sorted(job.settings.items())), job.seed, job.quick)[1]
-    return _judged(
-        job, found, STIFF_TURN,
+    return result(
+        job, _pegs(key_of(job), job.seed, job.quick)[1],
         f"runs of a Panda insert from tilts within {SPREAD_DEG:g} degrees, learned from one demonstration",
-        "The demonstration starts at +8 degrees.",
+        "The demonstration starts at +8 degrees. The push by hand runs once from each start.",
     )  # fmt: skip
 
 
 def by_hand(axes: str = "x", turn: str = "", at: Sequence[float] = TIP) -> Document:
-    """An LMC document: straight down, free along some axes, turning freely about some, at a point of the tool."""
+    """An LMC document: straight down, compliant along some axes and about some, at a point of the tool."""
 
     def part(direction: Any, free: str, stiffness: float, speed: float) -> dict[str, Any]:
         held = np.array([0.0 if axis in free else stiffness for axis in "xyz"])
@@ -198,7 +154,7 @@ def by_hand(axes: str = "x", turn: str = "", at: Sequence[float] = TIP) -> Docum
         }  # fmt: skip
 
     phase = {
-        "translation": part([0.0, 0.0, -1.0], axes, STIFF_N_M, 0.02), "rotation": part(None, turn, STIFF_NM_RAD, 0.0),
+        "translation": part([0.0, 0.0, -1.0], axes, STIFF_N_M, 0.02), "rotation": part(None, turn, 20.0, 0.0),
         "pitch": None, "stop": {"stall_s": 0.6, "lead_force_n": 20.0},
     }  # fmt: skip
     frame = {"work_at": list(at), "learned_at": list(at), "center_of_compliance": list(at), "axes": "base",
@@ -218,11 +174,12 @@ def centre(job: RowRun) -> RowResult:
     for at in ("tip", "wrist"):
         there = {name: [by_hand(axes, turn="y")] for name, (axes, where) in cases.items() if where == at}
         found |= {name: e.success[0] for name, e in run(job, "peg_in_hole", there, starts, "free_tool", at).items()}
-    reach = {name: _largest(tilts, success) for name, success in found.items()}
+    reach = {name: largest(tilts, success) for name, success in found.items()}
     tip, wrist = reach["tip, rotation alone"], reach["wrist, rotation alone"]
     return RowResult(
         ours=f"rotation alone inserts up to {tip:g} degrees about the tip, and up to {wrist:g} about the wrist"
-        + ("" if job.quick else f"; with x free, {reach['wrist, and free along x']:g} about the wrist"),
+        + ("" if job.quick else f"; with x free, {reach['wrist, and free along x']:g} about the wrist")
+        + f"; {len(tilts)} tilts, each run once",
         verdict="pass" if tip >= TILTS_DEG[-1] and wrist < TILTS_DEG[0] else "fail",
         head=("centre of compliance", "largest tilt, both signs [degrees]", *(f"{tilt:+g}" for tilt in tilts)),
         rows=[(name, f"{reach[name]:g}", *("in" if good else "no" for good in found[name])) for name in cases],
@@ -232,11 +189,43 @@ def centre(job: RowRun) -> RowResult:
     )  # fmt: skip
 
 
-def _largest(tilts: Sequence[float], success: NDArray[np.bool_]) -> float:
-    """Largest tilt up to which both signs insert. 0: not even the smallest."""
+def largest(tilts: Sequence[float], success: NDArray[np.bool_]) -> float:
+    """Largest tilt up to which both signs insert, or 0."""
     reach = 0.0
     for tilt in sorted({abs(t) for t in tilts}):
         if not all(good for t, good in zip(tilts, success, strict=True) if abs(t) == tilt):
             break
         reach = tilt
     return reach
+
+
+ONE, RIGID, HAND = "learned from one demonstration", "the same push, stiff", "by hand: straight down"
+
+
+def one(job: RowRun) -> RowResult:
+    """Row 37: valley and coupler, each from one demonstration that starts from one side, run from both."""
+    valleys, couplers = (skills_of(job, name, 1, 72_000) for name in ("valley", "hose_coupler"))
+    starts = {"start.offset_x": np.linspace(-REACH_M, REACH_M, job.count(13, 3)).tolist()}
+    ways = {ONE: valleys, RIGID: [stiff(s, "translation", STIFF_N_M) for s in valleys]}
+    found = {"valley": run(job, "valley", ways | ({} if job.quick else {HAND: [by_hand()]}), starts, "free_tool")}
+    ways = {ONE: couplers, RIGID: [stiff(s, "rotation", STIFF_TURN_NM_RAD) for s in couplers]}
+    ways |= {} if job.quick else {HAND: [by_hand(turn="y")]}
+    found["hose coupler"] = run(job, "hose_coupler", ways, _tilts(job.count(4, 2)), "free_tool", "tip")
+    turns = sum(each["phases"][0]["rotation"]["desired_direction"] is not None for each in couplers)
+    said = f" Of {len(couplers)} sets of the coupler {turns} learn a direction of turning, as if it had to be turned."
+    return of_one(job, found, said)
+
+
+def of_one(job: RowRun, found: Mapping[str, Mapping[str, Ran]], said: str) -> RowResult:
+    """Row 37 of what ran in each world."""
+    return RowResult(
+        ours="; ".join(f"{name} {each[ONE]}, stiff {each[RIGID].hits}" for name, each in found.items()),
+        verdict=compared(
+            job, [each[ONE] for each in found.values()], all(leads(job, e[ONE], e[RIGID]) for e in found.values())
+        ),
+        values={name.replace(" ", "_"): each[ONE].share for name, each in found.items()}, head=("world", *HEAD),
+        rows=[(name, *line) for name, runs in found.items() for line in lines(runs)],
+        difference="Every demonstration starts 40 mm to one side, or tilted by +8 degrees. The coupler is steered at "
+        "its tip, and stiff is stiff in rotation there. Pushes by hand show what compliance alone does."
+        + said,
+    )  # fmt: skip

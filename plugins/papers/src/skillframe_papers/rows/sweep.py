@@ -1,7 +1,6 @@
-"""The insertions that the rows of the two-arm paper read: configurations, tilts, joint friction, heights, parts.
+"""Insertions for the rows of the two-arm paper: configurations, tilts, joint friction, heights, parts.
 
-Computed once for all rows of the group. Insertions that differ in nothing but their configuration, tilt and joint
-friction run side by side.
+Computed once for all rows, those that differ only in configuration, tilt and joint friction side by side.
 """
 
 from __future__ import annotations
@@ -18,29 +17,29 @@ from skillframe_papers.rows.insertion import POSTURES, Asked, Row, insert, large
 
 NAMES = ("A", "B", "C", "D", "E", "E*")
 QUICK_NAMES = NAMES[1:5]
-"""A is steered about other points than the rest, so that it takes a simulation of its own."""
+"""A has other centres of compliance and takes its own simulation."""
 COARSE, BETWEEN = (4.0, 8.0, 12.0), (6.0, 10.0, 14.0)
 """Tilts of everything [degrees], and those that a full run adds upright with joint friction."""
 BEYOND = (16.0, 20.0, 24.0)
-"""Tilts at which configurations without joint friction go on, so that the sweep's end is not their limit [degrees]."""
+"""Further tilts without joint friction, beyond the sweep's end [degrees]."""
 HEIGHTS_M = (0.70, 0.75, 0.80)
-"""Of the fixture over the floor; the robot's own is the middle one."""
+"""Of the fixture over the floor; the middle one is the robot's."""
 PARTS = (0.05, 0.4)
-"""Friction of the parts, beside the world's own."""
+"""Friction of the parts, beside the world's."""
 PARTS_DEG = (8.0, 12.0)
-SECONDS, QUICK_SECONDS, QUICK_STUCK_S = 12.0, 7.5, 5.0
+SECONDS, QUICK_SECONDS = 12.0, 7.5
 
 
 class Sweep(NamedTuple):
     """Insertions by configuration.
 
     Attributes:
-        rows: by posture, too: both signs, upright with both frictions of the joints, mirrored with joint friction.
-        stiff: the joint friction that is not zero [Nm].
-        heights: with joint friction, by the fixture's height [m]; the robot's own height is among them.
+        rows: by posture, too: both signs, upright with both joint frictions, mirrored with joint friction.
+        stiff: the nonzero joint friction [Nm].
+        heights: with joint friction, by the fixture's height [m], the robot's included.
         beyond: without joint friction, at tilts past the end of `rows`.
-        parts: with joint friction, by friction of the parts; the world's own is among them.
-        bottom: at +8 and -8 degrees with joint friction, run on to the bottom of the hole.
+        parts: with joint friction, by friction of the parts, the world's included.
+        bottom: at +8 and -8 degrees with joint friction, to the bottom of the hole.
     """
 
     rows: dict[tuple[str, str], list[Row]]
@@ -59,7 +58,7 @@ class Sweep(NamedTuple):
         return largest(self.of(name, posture, stuck=stuck), sign, self.stiff if stuck else 0.0)
 
     def reach_at(self, name: str, sign: int, height: float) -> float:
-        """The same with joint friction, upright, with the fixture at a height [m]."""
+        """The same with joint friction, upright, at a fixture height [m]."""
         return largest(self.heights[name, height], sign, self.stiff)
 
     def reach_free(self, name: str, sign: int) -> float:
@@ -68,22 +67,22 @@ class Sweep(NamedTuple):
 
     @property
     def names(self) -> list[str]:
-        """Configurations that were run."""
+        """Computed configurations."""
         return [n for n in NAMES if (n, "upright") in self.rows]
 
     @property
     def postures(self) -> list[str]:
-        """Those that were run."""
+        """Computed postures."""
         return [p for p in POSTURES if ("B", p) in self.rows]
 
     @property
     def heights_run(self) -> list[float]:
-        """Heights of the fixture that were run [m]."""
+        """Computed heights of the fixture [m]."""
         return sorted({height for _, height in self.heights})
 
 
 def sweep(job: RowRun) -> Sweep:
-    """What a row's settings ask for. The rows of a group ask once."""
+    """Insertions for a row's settings, cached."""
     return _computed(tuple(sorted(job.settings.items())), job.seed, job.quick)
 
 
@@ -100,7 +99,7 @@ def _computed(settings: tuple[tuple[str, float], ...], seed: int, quick: bool) -
     names, all_names = (QUICK_NAMES, QUICK_NAMES) if quick else (NAMES[:5], NAMES)
     coarse, small = both(COARSE), both(PARTS_DEG)
     asked = {(n, "coarse"): (coarse, [0.0, stiff]) for n in all_names}
-    if quick:  # without joint friction every configuration inserts: from 8 degrees is what the rows ask
+    if quick:  # without joint friction all insert; the rows need 8 degrees
         asked |= {(n, "coarse"): (coarse, [stiff]) for n in names}
         asked |= {(n, "free"): (both(COARSE[1:2]), [0.0]) for n in names}
     if not quick:
@@ -140,7 +139,7 @@ class _Runs(NamedTuple):
         self, asked: Mapping[tuple[str, str], tuple[Sequence[float], Sequence[float]]], *, posture: str = "upright",
         height: float | None = None, parts: float | None = None, to_the_bottom: bool = False,
     ) -> dict[tuple[str, str], list[Row]]:  # fmt: skip
-        """Tilts and frictions of configurations, each named first in its key, side by side."""
+        """Tilts and frictions of configurations, named first in the key, side by side."""
         robot = load_robot_model("dual_panda")
         robot = robot if height is None else raised(robot, height)
         scene = load_world("dual_peg", {"friction": self.values["world.friction"] if parts is None else parts})
@@ -163,11 +162,11 @@ def stuck_in(settings: tuple[tuple[str, float], ...], seed: int, arm: int, quick
     scene = load_world("dual_peg", {"friction": values["world.friction"]})
     phase = phase_of("C", scene.tool.frames, values)
     stiff, tilts = [values["robot.joint_friction"]], both([8.0] if quick else [4.0, 8.0])
-    return insert(robot, scene, phase, tilts, stiff, seed=seed, duration_s=QUICK_STUCK_S if quick else SECONDS)
+    return insert(robot, scene, phase, tilts, stiff, seed=seed, duration_s=5.0 if quick else SECONDS)
 
 
 def phase_of(name: str, frames: dict[str, Any], values: Mapping[str, float]) -> Phase:
-    """A configuration of `NAMES`, "E*" for the relative task of E, pushed as the row's settings say."""
+    """A configuration of `NAMES`, "E*" for the relative task of E, with the row's settings."""
     arm = Arm(center_of_compliance=frames["tip"], share=1.0), Arm(center_of_compliance=frames["tip"])
     phase = Phase(arms=arm, lead_force_n=values["lead_force_n"], speed=values["speed"])
     made = configured(phase, name[0], frames)

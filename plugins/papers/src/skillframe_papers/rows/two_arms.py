@@ -1,7 +1,7 @@
-"""Rows 7 to 12, 24 and 25 of the papers' results: Table I and II of the two-arm paper, and what it says about them.
+"""Rows 7 to 12, 24 and 25: Tables I and II of the two-arm paper, and its statements about them.
 
-All rows read one sweep (`sweep`). A *null* is what a row's claim must be told from: the same bar, without the cause
-that the paper names. Each row prints what its null comes to.
+All rows read one sweep (`sweep`). A *null* has the same threshold without the cause that the paper names, and is
+printed.
 """
 
 from __future__ import annotations
@@ -14,13 +14,10 @@ from skillframe.extend.records import Illustration, RowResult, RowRun
 from skillframe_papers.rows.insertion import MOTION, PUBLISHED, Arms, Row
 from skillframe_papers.rows.sweep import HEIGHTS_M, Sweep, stuck_in, sweep
 
-STEP_DEG = 2.0
-FAR_DEG = 4.0
-"""The quick sweep's step, and what C, which fails at the first tilt of the paper, may be off by."""
 WRONG = ("common rotation", "turned away")
 SLAVE = "the slave's alone"
 SMALL_DEG, ROUGH = 8.0, 0.2
-"""Up to this tilt and from this friction of the parts on, the paper has no pair turn the wrong way (our reading)."""
+"""Up to this tilt and from this friction of the parts on, no pair turns the wrong way (a reading of the paper)."""
 
 
 def table(job: RowRun) -> RowResult:
@@ -50,13 +47,13 @@ def table(job: RowRun) -> RowResult:
 
 
 def _unlike(reach: dict[str, float]) -> list[str]:
-    """Which configurations are far from the paper's."""
     published = {n: PUBLISHED[n]["largest_deg"] for n in PUBLISHED if n in reach}
-    return [n for n, value in published.items() if abs(reach[n] - value) > FAR_DEG]
+    # The quick sweep's step, and the tolerance of C, which fails at the paper's first tilt
+    return [n for n, value in published.items() if abs(reach[n] - value) > 4.0]
 
 
 def _held(found: Sweep) -> str:
-    """What holding the pair changes: E beside E*."""
+    """Effect of holding the pair: E beside E*."""
     if "E*" not in found.names:
         return ""
     stuck = {n: found.of(n, stuck=True) for n in ("E", "E*")}
@@ -99,11 +96,12 @@ def slave(job: RowRun) -> RowResult:
     return RowResult(
         ours=f"C from 8 degrees, signs that insert: {sum(none)} of 2 without joint friction, {sum(master)} with the "
         f"master's alone, {sum(slave)} with the slave's alone"
-        + ("" if job.quick else f"; from 4 degrees with the slave's: {sum(worked[SLAVE][:2])} of 2"),
+        + ("" if job.quick else f"; from 4 degrees with the slave's: {sum(worked[SLAVE][:2])} of 2")
+        + "; each tilt and sign is run once",
         verdict="pass" if good else "fail", head=("joint friction in", *(f"{tilt:+g} degrees" for tilt in tilts)),
         rows=[(where, *each) for where, each in ends.items()],
-        difference=f"Null: the same friction in the master's joints, where the bar has {sum(not w for w in master)} of "
-        "2 fail. The paper has C fail at 4 degrees, too.",
+        difference=f"Null: the same friction in the master's joints, where the threshold has "
+        f"{sum(not w for w in master)} of 2 fail. The paper has C fail at 4 degrees, too.",
     )  # fmt: skip
 
 
@@ -120,7 +118,7 @@ Measure = Callable[[Row], float]
 
 
 def _ordered(found: Sweep, measure: Measure, *, stuck: bool) -> bool:
-    """Whether E is below D, and D below B, at +8 degrees. What does not insert is above everything."""
+    """Whether E is below D, and D below B, at +8 degrees, failures above everything."""
     e, d, b = (measure(r) if (r := _at_8(found, n, stuck)).outcome == "success" else np.inf for n in ("E", "D", "B"))
     return e < d < b
 
@@ -165,7 +163,7 @@ LINES: dict[str, tuple[int, Callable[[Row], Arms]]] = {
     "weighted by link length": (1, lambda r: r.weighted_rad),
     "largest way of a joint": (2, lambda r: r.largest_joint_rad),
 }
-"""Lines of Table II: their place in `MOTION`, and ours, by arm."""
+"""Lines of Table II: their place in `MOTION`, and the computed value by arm."""
 
 
 def paths(job: RowRun) -> RowResult:
@@ -207,7 +205,7 @@ def _pair(arms: Arms) -> str:
 
 
 def signs(job: RowRun) -> RowResult:
-    """Row 11: largest tilts of both signs, with the sweep's end out of reach where it can be."""
+    """Row 11: largest tilts of both signs, beyond the sweep's end where possible."""
     found = sweep(job)
     names, held = found.names[:5], [n for n in found.names[:5] if n != "E"]
     reaches = {f"{found.stiff:g} Nm, {p}": _signed(found, p) for p in found.postures}
@@ -229,10 +227,10 @@ def signs(job: RowRun) -> RowResult:
     ends = [n for n, each in free.items() if min(each) >= top]
     return RowResult(
         ours="signs differ by " + ", ".join(f"{n} {worst[n]:g}" for n in held) + " degrees at most",
-        verdict="pass" if max(worst[n] for n in held) <= STEP_DEG else "fail", rows=rows,
+        verdict="pass" if max(worst[n] for n in held) <= 2.0 else "fail", rows=rows,  # one step of the sweep
         head=["largest tilt, + / - [degrees]", *reaches],
         difference=f"Null: E, both arms of which are free, so that nothing holds the pair: by {worst['E']:g} degrees."
-        + (f" Without joint friction the sweep ends at {top:g} degrees, where {' and '.join(ends)} are not told apart."
+        + (f" Without joint friction the sweep ends at {top:g} degrees, where {' and '.join(ends)} do not differ."
            if ends else ""),
         values={f"apart_{n}_deg": worst[n] for n in worst},
     )  # fmt: skip
@@ -265,7 +263,7 @@ def failures(job: RowRun) -> RowResult:
         verdict="pass" if early == 0 and late > 0 else "fail", rows=rows,
         head=("friction of the parts", "tilt [degrees]", *(f"{n} turns the wrong way" for n in names)),
         difference=f"Null: {', '.join(never) or 'none'} never turn the wrong way, and alone would miss the second half "
-        "of the bar. With joint friction, both signs.",
+        "of the threshold. With joint friction, both signs.",
         values={"early": float(early), "late": float(late)},
     )  # fmt: skip
 
@@ -297,7 +295,7 @@ def forces(job: RowRun) -> RowResult:
 
 
 def best(job: RowRun) -> RowResult:
-    """Row 25: whether the parameters that are learned, E's, insert from the largest tilt."""
+    """Row 25: whether the learned parameters, E's, insert from the largest tilt."""
     found = sweep(job)
     stuck = {n: found.reach(n, 1, stuck=True) for n in found.names[:5]}
     free = {n: found.reach_free(n, 1) for n in found.names[:5]}
@@ -308,16 +306,16 @@ def best(job: RowRun) -> RowResult:
         head=("", "published [degrees]", f"{found.stiff:g} Nm, + [degrees]", "0 Nm, + [degrees]"),
         rows=[(n, _number(PUBLISHED[n]["largest_deg"]), f"{stuck[n]:g}", f"{free[n]:g}") for n in stuck],
         difference="Null: each of the others in E's place, of which "
-        f"{' and '.join(n for n in stuck if n != 'E' and stuck[n] < max(stuck.values())) or 'none'} miss the bar.",
+        f"{' and '.join(n for n in stuck if n != 'E' and stuck[n] < max(stuck.values())) or 'none'} "
+        "miss the threshold.",
         values={"learned_deg": stuck["E"], "others_deg": others},
     )  # fmt: skip
 
 
 def _picture(found: Sweep) -> Illustration:
-    """Table I as bars: published, and ours with and without joint friction."""
+    """Table I as bars: published, and computed with and without joint friction."""
     from matplotlib.figure import Figure
-
-    from skillframe.reports.drawing import BLUE, GREY, INK, RED, svg
+    from skillframe_segmenter.drawing import BLUE, GREY, INK, RED, svg
 
     figure = Figure(figsize=(7.0, 3.8))
     canvas = figure.add_subplot()

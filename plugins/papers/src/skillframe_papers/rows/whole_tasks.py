@@ -1,9 +1,8 @@
-"""Rows 32 and 33 of the papers' results: whole demonstrations are cut into phases, and an arm does the whole task.
+"""Rows 32 and 33: whole demonstrations are cut into phases, and an arm does the whole task.
 
-Three demonstrations a set, shown with a free tool and cut without being told how many phases there are, become a policy
-that a Panda runs. The fixture stands elsewhere in every run. Nulls: the same demonstrations learned as one phase, and
-the first of them played again, from where the tool is or at its recorded place. Cut in the middle stands beside them:
-it has phases, too, and no segmenter.
+Three demonstrations with a free tool, cut without a given number of phases, become a policy for a Panda; the fixture
+moves in every run. Nulls: one phase, and the first demonstration replayed, shifted or in place. Beside them: cut in the
+middle.
 """
 
 from __future__ import annotations
@@ -11,155 +10,145 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict
 from math import radians
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from skillframe_baselines.document import ReplaySettings
+from skillframe_baselines.replay import ReplaySettings
 
 from skillframe.demonstration.record import Demonstration
-from skillframe.document.source import learned
+from skillframe.document.file import learned
 from skillframe.errors import InputError
-from skillframe.execution.executor import Setup
-from skillframe.execution.prepare import load_robot_model, load_world, prepare
-from skillframe.extend.records import LearnOptions, RowResult, RowRun, Verdict
+from skillframe.execution.drive import Setup
+from skillframe.execution.prepare import load_robot_model, prepare
+from skillframe.extend.records import Document, LearnOptions, RowResult, RowRun
 from skillframe.extend.registry import registry
 from skillframe.frames import Float
 from skillframe.sequence import Part, Sequence
 from skillframe.skill import Skill
-from skillframe.teaching.sessions import record
-from skillframe.teaching.teacher import TeacherSettings
 from skillframe.world.scene import Scene
-from skillframe_papers.bars import ahead, counted, judged, together
-from skillframe_papers.rows.blocks import ran_made
-from skillframe_papers.rows.skills import Ran
+from skillframe_papers.rows.harness import (
+    HEAD,
+    Ran,
+    TaughtSet,
+    compared,
+    executed,
+    leads,
+    lines,
+    lmc,
+    not_behind,
+    seeds,
+    shown,
+    successes,
+    teacher,
+    world,
+)
 
-SEED, EACH = 67_000, 3
-SETS, QUICK_SETS = 4, 1
-STARTS, QUICK_STARTS = 6, 2
-SHARE, LONGEST_S = 0.9, 20.0
 ONE, SHIFTED, PLACED, HALVES = "one phase", "replay, shifted", "replay, in its place", "cut in the middle"
 NULLS = (ONE, SHIFTED, PLACED)
-QUICK_ONLY = ("policy", ONE, SHIFTED)
 
 
 class Whole(NamedTuple):
     """A task of two stages.
 
     Attributes:
-        world, params: where it is done.
-        moved: the fixture stands off by so much, evenly both ways [m, rad].
-        center: of compliance when it runs. None: where it was learned.
+        world, params: of the task.
+        moved: largest errors of the fixture, even both ways [m, rad].
+        center: of compliance of runs; None: where it was learned.
+        lift: of all starts, against collision with the moved fixture [m].
     """
 
     world: str
     params: Mapping[str, float]
     moved: Mapping[str, float]
     center: str | None
+    lift: float = 0.0
 
 
 TASKS = {
     "hose coupler": Whole(
-        "hose_coupler", {"interlock": 0.7}, {"fixture.tilt_y": radians(3.0), "fixture.offset_z": 0.005}, "tip"
+        "hose_coupler", {"interlock": 0.7}, {"fixture.tilt_y": radians(3.0), "fixture.offset_z": 0.005}, "tip", 0.006
     ),
     "corner": Whole("corner", {}, {"fixture.offset_x": 0.01, "fixture.offset_y": 0.01}, None),
 }
 
-Made = Callable[[], tuple[Skill, Setup]]
-Rngs = list[np.random.Generator]
+
+def _learned(given: list[Demonstration], way: str) -> tuple[Document, ...]:
+    if way == "policy":
+        return (learned(registry().skill("policy"), given, LearnOptions()),)
+    if way == ONE:
+        return (lmc(given),)
+    if way == HALVES:
+        middle = [(d, 0.5 * float(d.time[0] + d.time[-1])) for d in given]
+        return lmc([d.between(stop=at) for d, at in middle]), lmc([d.between(start=at) for d, at in middle])
+    settings = asdict(ReplaySettings(mode="absolute" if way == PLACED else "shifted"))
+    return (learned(registry().skill("replay"), given[:1], LearnOptions(settings=settings)),)
 
 
-def _methods(shown: list[Demonstration], task: Whole, scene: Scene, names: Iterable[str]) -> dict[str, Made]:
-    """By name: a method's skill and how it runs. What refuses the demonstrations is not among them."""
-    robot = load_robot_model("panda")
-
-    def made(kind: str, given: list[Demonstration], **settings: Any) -> Made:
-        document = learned(registry().skill(kind), given, LearnOptions(settings=settings))
-        return lambda: prepare(robot, scene, document, task.center)
-
-    def halves() -> Made:
-        middle = [(d, 0.5 * float(d.time[0] + d.time[-1])) for d in shown]
-        first = made("lmc", [d.between(stop=at) for d, at in middle])
-        second = made("lmc", [d.between(start=at) for d, at in middle])
-        parts = [Part("first half", lambda: first()[0]), Part("second half", lambda: second()[0])]
-        return lambda: (Sequence(parts), first()[1])
-
-    ways: dict[str, Callable[[], Made]] = {
-        "policy": lambda: made("policy", shown), ONE: lambda: made("lmc", shown),
-        SHIFTED: lambda: made("replay", shown[:1], **asdict(ReplaySettings())),
-        PLACED: lambda: made("replay", shown[:1], **asdict(ReplaySettings(mode="absolute"))),
-        HALVES: halves,
-    }  # fmt: skip
-    found = {}
+def _ways(
+    given: list[Demonstration], task: Whole, scene: Scene, names: Iterable[str]
+) -> dict[str, tuple[Skill, Setup] | None]:
+    found = dict[str, tuple[Skill, Setup] | None]()
     for name in names:
         try:
-            found[name] = ways[name]()
+            documents = _learned(given, name)
         except InputError:  # a refusal teaches nothing
+            found[name] = None
             continue
+        (first, setup), *others = (_ready(scene, each, task.center) for each in documents)
+        parts = [Part(f"part {i + 1}", each) for i, each in enumerate((first, *(skill for skill, _ in others)))]
+        found[name] = (Sequence(parts) if others else first(), setup)
     return found
 
 
-def _draws(task: Whole, scene: Scene, count: int, seed: int) -> dict[str, Float]:
-    """Starts that were shown, in turn, and fixtures that stand elsewhere."""
-    rng, shown = np.random.default_rng([seed, 1]), scene.task.starts
-    draws = {key: rng.uniform(-by, by, count) for key, by in task.moved.items()}
+def _ready(scene: Scene, document: Document, center: str | None) -> tuple[Callable[[], Skill], Setup]:
+    """How to build a document's skill for a Panda, as often as it is needed, and its setup."""
+    robot = load_robot_model("panda")
+    return lambda: prepare(robot, scene, document, center)[0], prepare(robot, scene, document, center)[1]
+
+
+def draws(task: Whole, scene: Scene, count: int, seed: int) -> dict[str, Float]:
+    """Starts as they were shown, in turn, and places of the fixture."""
+    rng, starts = np.random.default_rng([seed, 1]), scene.task.starts
+    sampled = {key: rng.uniform(-by, by, count) for key, by in task.moved.items()}
     for i in range(count):
-        for key, value in shown[i % len(shown)].items():
-            draws.setdefault(key, np.zeros(count))[i] += value
-    return draws
+        for key, value in starts[i % len(starts)].items():
+            sampled.setdefault(key, np.zeros(count))[i] += value
+    if task.lift:
+        sampled["start.offset_z"] = sampled.get("start.offset_z", np.zeros(count)) + task.lift
+    return sampled
 
 
-def _rngs(count: int, seed: int) -> Rngs:
-    return [np.random.default_rng([seed, 2, k]) for k in range(count)]
+def _run(job: RowRun, name: str) -> RowResult:
+    task, names = TASKS[name], ("policy", ONE, SHIFTED) if job.quick else ("policy", *NULLS, HALVES)
+    scene, sets = world(job, task.world, **task.params), list[TaughtSet]()
+    for seed in seeds(job, 67_000, job.count(4, 1)):
+        given = shown(scene, teacher(job), count=3, seed=seed, duration_s=20.0)
+        where = draws(task, scene, job.count(6, 2), seed)
+        sets.append(TaughtSet(_ways(given, task, scene, names), where, (seed, 2)))
+    return result(job, successes(executed(job, scene, sets, duration_s=20.0)))
 
 
-def _executed(job: RowRun, name: str) -> dict[str, Ran]:
-    """Successes by method, set and start."""
-    task, person = TASKS[name], TeacherSettings(aim_noise=radians(job.settings["teacher.aim_noise_deg"]))
-    scene = load_world(task.world, {**task.params, "friction": job.settings["world.friction"]})
-    sets, count = job.count(SETS, QUICK_SETS), job.count(STARTS, QUICK_STARTS)
-    won: dict[str, list[list[bool]]] = {way: [] for way in (QUICK_ONLY if job.quick else ("policy", *NULLS, HALVES))}
-    methods, made = list[dict[str, Made]](), list[tuple[Skill, Setup]]()
-    given = list[tuple[Mapping[str, Float], Rngs]]()
-    for i in range(sets):
-        seed = SEED + 1000 * job.seed + i
-        shown = record(load_robot_model("free_tool"), scene, person, count=EACH, seed=seed, duration_s=20.0)
-        methods.append(_methods(list(shown.demonstrations), task, scene, won))
-        made += [each() for each in methods[-1].values()]
-        given += [(_draws(task, scene, count, seed), _rngs(count, seed)) for _ in methods[-1]]
-    done = iter(ran_made(made, given, duration_s=LONGEST_S))
-    for i, ways in enumerate(methods):
-        ended = {way: next(done) for way in ways}
-        for way, hits in won.items():
-            hits.append(ended[way].success.tolist() if way in ended else [False] * count)
-        job.tell(f"{name}, set {i}: {', '.join(f'{way} {sum(hits[-1])}' for way, hits in won.items())} of {count}")
-    return {way: Ran(np.array(hits)) for way, hits in won.items()}
-
-
-def _told(job: RowRun, found: Mapping[str, Ran]) -> RowResult:
-    """The row, from successes by method."""
-    ours, nulls = found["policy"], [name for name in NULLS if name in found]
-    share: Verdict = judged(ours.hits, ours.trials, SHARE, quick=job.quick)
-    beside = all(ahead(ours.hits, found[name].hits, ours.trials, quick=job.quick) for name in nulls)
-    said = ""
+def result(job: RowRun, found: Mapping[str, Ran]) -> RowResult:
+    """Rows 32 and 33 of runs by way."""
+    ours, nulls = found["policy"], {name: found[name] for name in NULLS if name in found}
+    halves = ""
     if HALVES in found:
-        behind = ahead(ours.hits, found[HALVES].hits, ours.trials, quick=job.quick)
-        said = f" Demonstrations {HALVES}, without a segmenter, are {'' if behind else 'not '}behind by 95 % intervals."
+        fewer = "fewer" if leads(job, ours, found[HALVES]) else "not fewer"
+        halves = f"; without a segmenter, {HALVES}, {found[HALVES]}, by 95 % intervals {fewer}"
     return RowResult(
-        ours=f"{counted(ours.hits, ours.trials)} runs of a Panda do the whole task; nulls: "
-        + ", ".join(f"{name} {found[name].hits}" for name in nulls)
-        + (f"; {HALVES} {found[HALVES].hits}" if HALVES in found else ""),
-        verdict=together([share], beside), values={"share": ours.hits / ours.trials},
-        head=("skill", "trials", "sets without a failure"),
-        rows=[(name, counted(each.hits, each.trials), each.sets) for name, each in found.items()],
-        difference=f"Shown with a free tool. A replay is of a set's first demonstration.{said}",
+        ours=f"{ours} runs of a Panda do the whole task; nulls: "
+        + ", ".join(f"{name} {each.hits}" for name, each in nulls.items())
+        + halves,
+        verdict=compared(job, [ours], not not_behind(job, ours, nulls)), values={"share": ours.share}, head=HEAD,
+        rows=lines(found), difference="Shown with a free tool. A replay is of a set's first demonstration.",
     )  # fmt: skip
 
 
 def coupler(job: RowRun) -> RowResult:
     """Row 32: lower, then interlock."""
-    return _told(job, _executed(job, "hose coupler"))
+    return _run(job, "hose coupler")
 
 
 def corner(job: RowRun) -> RowResult:
     """Row 33: set the box down, then push it into the corner."""
-    return _told(job, _executed(job, "corner"))
+    return _run(job, "corner")

@@ -1,0 +1,1 @@
+"""Commands for certificates, comparisons and real trials."""

@@ -1,0 +1,1 @@
+"""First page of a report on a certificate's folder."""

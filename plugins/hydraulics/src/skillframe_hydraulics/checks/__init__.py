@@ -1,0 +1,1 @@
+"""Checks of a hydraulic machine before it runs."""

@@ -1,0 +1,193 @@
+r"""Whether a closed chain can stand in a configuration: reach, stroke, dead centre, and holding pressure.
+
+A cylinder pushes at most \(A_a p_S - A_b p_R\) and pulls at most \(A_b p_S - A_a p_R\); at rest it must hold
+F = R^-T G^T g (`robot.chain`). Near a dead centre the moment arm dx/dz vanishes and no force helps. Friction is
+neglected.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from skillframe.errors import InputError
+from skillframe.frames import Float, norm
+from skillframe.robot.chain import MISFIT, ClosedChain, OutOfReach
+from skillframe.robot.tables import Actuation
+from skillframe_hydraulics.checks.figures import CYLINDER, is_motor, needed, relief, require_known
+from skillframe_hydraulics.checks.figures import areas as chamber_areas
+
+LEAST_ARM = 0.1  # m; below it, a piston force error of 1 kN has less than a third of its effect at mid stroke
+COVERED = 0.5  # share of a joint's range below which its cylinder's lengths are doubted; drawn ranges are often wide
+LARGEST_RATIO = 20.0  # of joint rates; an encoder's 0.1 mrad becomes 2 mrad, and bodies seem 400 times as heavy
+_NEEDED = ("bore", "rod", "stroke", "supply_pressure", "return_pressure")
+
+
+class Capacity(NamedTuple):
+    """Largest push and pull [N, Nm] and stroke [m, 0 of a motor]."""
+
+    push: float
+    pull: float
+    stroke: float
+
+
+def capacity(actuation: Actuation, where: object = "robot.toml") -> Capacity:
+    """Largest push and pull of a hydraulic cylinder at rest, by its supply and its port relief.
+
+    Raises:
+        InputError: a required parameter is missing.
+    """
+    require_known(actuation, _NEEDED, where)
+    p, (area_a, area_b) = actuation.known, chamber_areas(actuation)
+    high, low = min(p["supply_pressure"], relief(actuation)), p["return_pressure"]
+    return Capacity(area_a * high - area_b * low, area_b * high - area_a * low, p.get("stroke", 0.0))
+
+
+def areas(actuation: Sequence[Actuation]) -> Float:
+    """Piston areas (k,) [m^2], by which actuators of one joint share its load, or 1 for all if one is unknown."""
+    sizes = [a.known.get("displacement" if is_motor(a) else "bore") for a in actuation]
+    if not all(isinstance(size, (int, float)) and size > 0.0 for size in sizes):
+        return np.ones(len(sizes))
+    return np.array([_area(a) for a in actuation], dtype=np.float64)
+
+
+def _area(actuation: Actuation) -> float:
+    """Area of chamber a [m^2], or volume per radian of a motor [m^3]."""
+    p = actuation.known
+    return float(p["displacement"]) if is_motor(actuation) else math.pi / 4 * float(p["bore"]) ** 2
+
+
+def problems(chain: ClosedChain, z: Float) -> list[str]:
+    """Sentences on why the chain cannot stand at minimal coordinates (n,), empty if it can.
+
+    Foreign actuators without areas or pressures are checked for stroke and moment arm only.
+
+    Raises:
+        InputError: a cylinder without pressures or areas.
+    """
+    try:
+        state = chain.at(z, np.zeros(len(chain.independent)))
+    except OutOfReach as error:
+        return [f"{error.problem}; {error.fix}"]
+    found = [
+        f"the loop {name} is open by {1e3 * gap:.3g} mm, because its joints do not turn in one plane"
+        for name, gap in zip((loop.name for loop in chain.loops), norm(chain.gaps(state.q)), strict=True)
+        if gap > MISFIT
+    ]
+    turns = np.abs(state.embedding[chain.dependent]).max(axis=1, initial=0.0)
+    for joint, turn in zip(chain.dependent, turns, strict=True):
+        if turn > LARGEST_RATIO:
+            name = chain.model.names[int(joint) + 1]
+            far = f"it moves {turn:.3g} times as far as what moves it"
+            found.append(f"the linkage of {name} is near its dead centre: {far}")
+    found += _outside(chain, state.q)
+    for name, arm in zip(chain.actuated, np.abs(state.arms).max(axis=1), strict=True):
+        if name not in chain.independent and arm < LEAST_ARM:
+            found.append(f"{name} is near its dead centre: its moment arm is {arm:.3f} m, below {LEAST_ARM:g} m")
+    if not found:
+        spec = chain.robot.spec
+        for actuation, force in zip(spec.actuation, state.holding_force(areas(spec.actuation) ** 2), strict=False):
+            if actuation.fmu == CYLINDER or all(name in actuation.known for name in needed(actuation, _NEEDED)):
+                found += _overload(actuation, force, spec.folder / "robot.toml")
+    return found
+
+
+def require_feasible(chain: ClosedChain, z: Float) -> None:
+    """Refuse a configuration that the machine cannot stand in.
+
+    Raises:
+        InputError: names every joint that prevents it.
+    """
+    found = problems(chain, z)
+    if found:
+        place = ", ".join(f"{name} {value:.4g}" for name, value in zip(chain.independent, z, strict=True))
+        raise InputError(f"{chain.robot.spec.name} at {place}", "; ".join(found), "choose another configuration")
+
+
+def _outside(chain: ClosedChain, q: Float) -> list[str]:
+    model, found = chain.model, []
+    struts = {f"{strut.name}_rod": strut for strut in chain.robot.spec.strut}
+    for index in range(1, model.njoints):
+        value = q[i := model.joints[index].idx_q]
+        low, high = model.lowerPositionLimit[i], model.upperPositionLimit[i]
+        if low - 1e-9 <= value <= high + 1e-9:
+            continue
+        if strut := struts.get(model.names[index]):
+            size = f"{strut.closed:.4g} to {strut.closed + strut.stroke:.4g} m long"
+            found.append(f"the pins of {strut.name} would be {strut.closed + value:.4g} m apart, and it is {size}")
+        else:
+            found.append(f"{model.names[index]} would stand at {value:.4g}, outside {low:.4g} to {high:.4g}")
+    positions = dict(
+        zip(chain.actuated, q[[chain.model.joints[model.getJointId(n)].idx_q for n in chain.actuated]], strict=True)
+    )
+    for actuation in chain.robot.spec.actuation:
+        if actuation.joint in struts:
+            continue
+        if actuation.fmu == CYLINDER and "stroke" in actuation.known and not is_motor(actuation):
+            value, stroke = positions[actuation.joint], float(actuation.known["stroke"])
+            slack = 0.02 + 0.02 * stroke  # tolerance of the FMU: fmus/hydraulic_cylinder/checks.h
+            if not -slack <= value <= stroke + slack:
+                found.append(f"{actuation.joint} would stand at {value:.4g} m, outside its stroke of {stroke:.4g} m")
+    return found
+
+
+def short_struts(chain: ClosedChain) -> Iterator[str]:
+    """Sentences on cylinders that let the joint between their pins pass less than `COVERED` of its range."""
+    model, data = chain.model, chain.model.createData()
+    for strut in chain.robot.spec.strut:
+        ends = [model.getFrameId(f"{strut.name}_{part}", pin.FrameType.BODY) for part in ("barrel", "eye")]
+        base, eye = ({int(j) for j in model.supports[model.frames[end].parentJoint]} for end in ends)
+        between = (base ^ eye) - {model.getJointId(f"{strut.name}_hinge")}
+        if len(between) != 1:
+            continue
+        joint = between.pop()
+        low, high = (float(limit[model.joints[joint].idx_q]) for limit in (
+            model.lowerPositionLimit, model.upperPositionLimit))  # fmt: skip
+        q, spread = chain.home.copy(), np.linspace(low, high, 201)
+        apart = []
+        for value in spread:
+            q[model.joints[joint].idx_q] = value
+            pin.framesForwardKinematics(model, data, q)
+            apart.append(float(np.linalg.norm(data.oMf[ends[0]].translation - data.oMf[ends[1]].translation)))
+        fits = (np.array(apart) >= strut.closed) & (np.array(apart) <= strut.closed + strut.stroke)
+        if fits.mean() < COVERED:
+            name, share = model.names[joint], f"{100.0 * fits.mean():.0f} %"
+            apart_m = f"over it the pins are {min(apart):.4g} to {max(apart):.4g} m apart"
+            size = f"it is {strut.closed:.4g} to {strut.closed + strut.stroke:.4g} m long"
+            yield f"{strut.name} allows {share} of the range of {name}: {apart_m}, and {size}"
+
+
+def require_held(actuation: Sequence[Actuation], hold: Float, supply: Float, where: object) -> None:
+    """Refuse trials whose cylinders cannot hold their loads, without stiction.
+
+    `hold` (N, k) are piston forces at rest [N], `supply` (N, k) supply pressures [Pa].
+
+    Raises:
+        InputError: names the first trial's overloaded cylinders.
+    """
+    for forces, pressures in zip(hold, supply, strict=True):
+        found: list[str] = []
+        for one, force, pressure in zip(actuation, forces, pressures, strict=True):
+            found += _overload(replace(one, parameters={**one.parameters, "supply_pressure": float(pressure)}), force)
+        if found:
+            raise InputError(where, "; ".join(found), "raise the supply pressure, carry less, or start elsewhere")
+
+
+def _overload(actuation: Actuation, force: float, where: object = "robot.toml") -> list[str]:
+    """A sentence on a force that a cylinder cannot hold [N], or none."""
+    limit, supply, opens = capacity(actuation, where), actuation.known["supply_pressure"], relief(actuation)
+    given = f"{supply / 1e5:.4g} bar can give" if supply <= opens else f"port relief at {opens / 1e5:.4g} bar leaves"
+    bound, way = (limit.push, "push") if force > 0.0 else (limit.pull, "pull")
+    if abs(force) <= bound:
+        return []
+    if is_motor(actuation):
+        way, unit = "turn with", "kNm"
+    else:
+        unit = "kN"
+    asked = f"{actuation.joint} would have to {way} {abs(force) / 1e3:.1f} {unit}"
+    return [f"{asked}, more than the {max(bound, 0.0) / 1e3:.1f} {unit} that {given}"]

@@ -1,0 +1,1 @@
+"""Controller of hydraulic machines: virtual decomposition control."""

@@ -1,0 +1,140 @@
+"""Oil balance of a hydraulic machine's cylinders, compiled: equations (1) and (2) of `skillframe_hydraulics.watch`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import casadi as ca
+
+from skillframe.frames import Float
+from skillframe_hydraulics.law.vdc_actuator import Cylinders, chamber_lengths
+from skillframe_hydraulics.symbolic_or_numeric import copysign, maximum, minimum
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Bounds:
+    """What a sound machine keeps to, chosen for the shipped crane with at least twice what it needs.
+
+    Attributes:
+        still: number of equal readings that mean a stopped sensor.
+        sure: standard deviations of noise, exceeded once in 1e15.
+        sunken: pressure below the return line's, whose check valve passes 1e-3 m3/s at 1e5 [Pa]; vacuum: gauge [Pa].
+        moving: speed of a moving piston for noiseless sensors [m/s].
+        window: checks per balance; lags: in checks, 20 to 60 ms, of which the shipped crane needs 20.
+        floor, floor_in_swing: tolerated motion of the piston [m]; share: of the flow.
+        unsure: standard deviation or last change of a supply pressure above which a valve may pass from zero up to (2),
+            because early fits can be wrong by 16 bar with a small standard deviation [Pa].
+        alike: share of another motion below which one is negligible.
+        spread: standard deviations of supply and overlap.
+        spool_floor, spool_share: for misplaced spools, motion [m] and share of the flow.
+        excess, missed: s_1 and s_2 [m]; fast, slow: checks per sum of (3).
+    """
+
+    still: int = 5
+    sure: float = 8.0
+    sunken: float = 2e5
+    vacuum: float = -1e5
+    moving: float = 5e-3
+    window: int = 5
+    lags: tuple[int, ...] = (1, 2, 3)
+    floor: float = 5e-4
+    floor_in_swing: float = 1e-3
+    share: float = 0.5
+    unsure: float = 1e6
+    alike: float = 0.25
+    spread: float = 2.0
+    spool_floor: float = 1e-4
+    spool_share: float = 0.1
+    excess: float = 0.05
+    missed: float = 0.06
+    fast: int = 5
+    slow: int = 10
+
+    @property
+    def length(self) -> int:
+        """Checks to be stored for a balance at the largest lag."""
+        return self.window + max(self.lags) + 1
+
+
+BOUNDS = Bounds()
+
+
+class Knowledge(NamedTuple):
+    """State of the valves (N, k).
+
+    Attributes:
+        supply, unsure: pressure and its uncertainty [Pa]. overlap: used by the controller, share of the travel.
+        least, most: likely range of the overlap; ratio: flow over the rated one.
+    """
+
+    supply: Float
+    overlap: Float
+    unsure: Float
+    least: Float
+    most: Float
+    ratio: Float
+
+
+def balance_function(c: Cylinders, period: float) -> ca.Function:
+    """A check of one machine with k cylinders: (1), the sums of (2), and whether the usual lag explains all.
+
+    Inputs, (k,) each: mean command since the last check, pressures a and b, piston; the fields of `Knowledge`;
+    tolerance [m] of a balance, and of a spool. Then sums of (2), and readings, at the last checks, rows of k.
+    Outputs: these with the new check first; volumes of both chambers, and their compressed part; 1 if all balances are
+    explained; 1 if all spools may be in place.
+    """
+    k, length = len(c.area_a), BOUNDS.length
+    given = [ca.SX.sym(f"given{i}", k) for i in range(12)]
+    valve, p_a, p_b, piston, *known, floor, spool_floor = given
+    sums, readings = (ca.SX.sym(name, k, length * rows) for name, rows in (("sums", 10), ("readings", 3)))
+    swung = Knowledge(*known)
+    sure = swung.unsure <= BOUNDS.unsure
+    supply = ca.if_else(sure, swung.supply, maximum(swung.supply, c.supply_pressure))
+    spread = ca.if_else(sure, BOUNDS.spread * swung.unsure, 0.0)
+    ends = {
+        laminar: [
+            _edge(c, pressure, fills, supply - spread if laminar else supply + spread, laminar, shares)
+            for pressure, fills, shares in (
+                (p_a, valve > 0.0, (c.edge_pa, c.edge_at)),
+                (p_b, valve <= 0.0, (c.edge_pb, c.edge_bt)),
+            )
+        ]
+        for laminar in (True, False)
+    }
+    volumes = []  # lower and upper ends of (2) into both chambers, and both ends for the likely overlaps
+    for overlap, ratio, laminar in (
+        (swung.overlap, 1.0, True), (swung.overlap, 1.0, False),
+        (swung.most, swung.ratio, True), (swung.least, swung.ratio, False),
+    ):  # fmt: skip
+        opening = minimum(maximum(ca.fabs(valve) - overlap, 0.0) / (1.0 - overlap), 1.0) * ratio
+        volumes += [period * c.edge * opening * each for each in ends[laminar]]
+    passed = ca.horzcat(*map(ca.fabs, volumes[2:4]), *volumes)
+    told, seen = ca.horzcat(passed + sums[:, :10], sums[:, :-10]), ca.horzcat(piston, p_a, p_b, readings[:, :-3])
+    gone = seen[:, :3] - seen[:, 3 * BOUNDS.window : 3 * BOUNDS.window + 3]
+    lagged, begun = 10 * BOUNDS.lags[0], 10 * (BOUNDS.lags[0] + BOUNDS.window)
+    usual = told[:, lagged : lagged + 10] - told[:, begun : begun + 10]
+    areas = ca.horzcat(c.area_a, c.area_b)
+    soft = ca.horzcat(c.area_a / c.bulk_modulus, c.area_b / c.bulk_modulus)
+    squeezed = soft * ca.horzcat(*chamber_lengths(c, piston)) * gone[:, 1:]
+    taken = areas * ca.horzcat(gone[:, 0], -gone[:, 0]) + squeezed
+    spare, loose = (areas * ca.horzcat(way, way) + BOUNDS.share * ca.fabs(squeezed) for way in (floor, spool_floor))
+    closed = ca.fabs(taken - usual[:, 4:6]) <= spare + BOUNDS.share * usual[:, :2]
+    off = ca.fabs(taken - usual[:, 6:8]) > loose
+    explained = ca.vertcat(ca.sum1(ca.sum2(closed)) >= 2 * k, ca.sum1(off[:, 0] * off[:, 1]) < 1)
+    return ca.Function("balance", [*given, sums, readings], [told, seen, taken, squeezed, explained])
+
+
+def _edge(
+    c: Cylinders, pressure: ca.SX, fills: ca.SX, supply: ca.SX, laminar: bool, shares: tuple[Float, Float]
+) -> ca.SX:  # fmt: skip
+    """Root of the pressure drop into a chamber from the supply, or out of it [sqrt(Pa)], optionally laminar.
+
+    It is times the edge's share of the rated conductance, of `shares` for flow in and flow out.
+    """
+    drop = ca.if_else(fills, supply - pressure, c.return_pressure - pressure)
+    shut = c.feed_check * (pressure - supply) > 0.0
+    share = ca.if_else(fills, ca.if_else(shut, 0.0, shares[0]), shares[1])
+    if laminar:
+        return share * (drop / ca.sqrt(ca.sqrt(drop * drop + c.laminar_pressure**2)))
+    return share * copysign(ca.sqrt(ca.fabs(drop)), drop)

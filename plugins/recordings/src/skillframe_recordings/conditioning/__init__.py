@@ -1,0 +1,1 @@
+"""Wrench conditioning: filters, noise figures, bias and tool weight."""

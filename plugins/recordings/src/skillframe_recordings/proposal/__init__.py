@@ -1,0 +1,1 @@
+"""Proposed layout of a foreign table, with reasons and open questions."""

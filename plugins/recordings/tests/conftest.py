@@ -1,0 +1,3 @@
+"""Demonstrations made from closed forms, as the core's tests have them."""
+
+from tests.unit.demonstration.conftest import demo, rows, write  # noqa: F401

@@ -1,0 +1,104 @@
+"""Skills through DDS against the stand-in for the controller, in lockstep."""
+
+import threading
+
+import numpy as np
+import pytest
+from nodes import HOST
+from rehearsal import cell, rehearse
+from skillframe_drive.cell import Cell
+from skillframe_drive.fake import FakeArm
+from skillframe_drive.runs import load_task, run_once
+from skillframe_ros2.fake import FakeCrisp
+from skillframe_ros2.link import Ros2Link
+
+import skillframe
+from skillframe import LearnedSkill
+from skillframe.world.quantities import SensorSettings
+
+MOVED = {"fixture.offset_x": 0.0033, "fixture.offset_y": 0.0022, "fixture.tilt_x": 0.0803}  # 4 mm and 4.6 degrees
+
+
+class Tried:
+    """A run of a skill at the tip on a stand-in in another thread.
+
+    Attributes:
+        run: the runner's result; arm: the truth; said: the stand-in's lines; fake: the stand-in.
+    """
+
+    def __init__(self, skill, world, *, coc="tip", duration_s=30.0, truth=None, **faults):
+        sensors = SensorSettings(force_noise=0.3, torque_noise=0.02)
+        self.arm, self.said = FakeArm("fr3", world, truth or {}, 0, sensors), []
+        self.fake = FakeCrisp(self.arm, HOST, lockstep=True, faults=faults, say=self.said.append)
+        ends = threading.Event()
+        serving = threading.Thread(target=self.fake.run, args=(ends.is_set,))
+        serving.start()
+        task = load_task(Cell(robot="fr3", link="ros2", host=HOST, world=world, witness="pose"))
+        try:
+            link = Ros2Link(HOST)
+            try:
+                self.run = run_once(
+                    LearnedSkill.load(skill), task, link, coc=coc, slow=1.0, dry=False, duration_s=duration_s,
+                    rate_hz=100.0, done=lambda: self.arm.ground().goal,
+                )  # fmt: skip
+            finally:
+                link.close()
+        finally:
+            ends.set()
+            serving.join()
+            self.fake.close()
+
+
+@pytest.mark.slow
+def test_the_valley_is_the_simulated_one(valley_skill):
+    tried = Tried(valley_skill, "valley")
+    assert tried.run.success and tried.arm.ground().goal
+    simulated = [skillframe.run(valley_skill, "valley", "fr3", seed=seed, coc="tip") for seed in range(3)]
+    durations, peaks = (
+        np.array([getattr(each, name) for each in simulated]) for name in ("duration_s", "peak_force_n")
+    )
+    assert 0.98 * durations.min() < tried.run.duration_s < 1.02 * durations.max()
+    assert peaks.min() - 2.0 < tried.run.peak_force_n < peaks.max() + 2.0
+    assert tried.run.trace.meta["missed"] <= 1 and tried.fake.commands > 500
+    stiffness, damping = (float(tried.fake._values[f"task.{each}_pos_z"]) for each in "kd")
+    assert (
+        damping > 1.5 * 2.0 * stiffness**0.5
+    )  # from the robot's inertia of some 6 kg: the controller's own is for 1 kg
+
+
+@pytest.mark.slow
+def test_a_peg_whose_hole_is_moved_and_tilted_is_inserted_by_a_runner_that_is_not_told(tmp_path):
+    path = tmp_path / "peg.skill.json"
+    skillframe.learn(skillframe.record("peg_in_hole", count=2, seed=3)).save(path)
+    tried = Tried(path, "peg_in_hole", truth=MOVED)
+    assert tried.arm.ground().goal and tried.run.success
+    assert tried.run.trace.meta["missed"] <= 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("faults", "cause", "said"),
+    [
+        ({"cut": 0.3}, "no state from the robot for 100 ms", "the controller follows its last target"),
+        ({"protective_stop": 0.3}, "no state from the robot for 100 ms", "the controllers are deactivated: planted"),
+    ],
+)
+def test_a_fault_ends_the_run_in_time(valley_skill, faults, cause, said):
+    tried = Tried(valley_skill, "valley", **faults)
+    assert tried.run.failure.startswith(cause) and tried.run.trace.meta["ended_by"] == "link"
+    assert any(said in line for line in tried.said)
+    assert tried.run.duration_s == pytest.approx(0.3, abs=0.02)  # of the loop's clock, whose last tick waited 100 ms
+
+
+@pytest.mark.slow
+def test_a_centre_of_compliance_that_is_not_the_end_effector_is_refused_before_anything_is_sent(valley_skill):
+    tried = Tried(valley_skill, "valley", coc=None)
+    assert "frame tip is 200.0 mm" in tried.run.failure and tried.fake.commands == 0
+    assert tried.fake._values["task.k_pos_x"] == 4000.0
+
+
+@pytest.mark.slow
+def test_from_the_command_line_a_check_sends_nothing(tmp_path):
+    ended = rehearse("ros2", ["check", str(cell(tmp_path, "fr3", "ros2"))])
+    assert ended.code == 0 and ended.said.count("ok ") == 4 and "500 states a second" in ended.said
+    assert "0 commands" in ended.fake

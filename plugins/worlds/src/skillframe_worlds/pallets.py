@@ -1,0 +1,167 @@
+"""`pallets`: a machine's load pushed into the corner of a stack of pallets and a stop (seed, Fig. 11).
+
+Both surfaces are plates on springs (`skillframe.world.scene.Sprung`), of 1e6 N/m for wood and 3e4 N/m for styrofoam.
+Pallets are 1.2 x 0.8 x 0.144 m (EN 13698-1).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skillframe.frames import Float, norm
+from skillframe.world.scene import Geom, Scene, Sprung, State, Task, Tool, Vector
+from skillframe.world.shapes import TOOL_COLOUR, TOOL_DOWN, require
+
+RADIUS = 0.05
+LENGTH, WIDTH, STEP = 1.2, 0.8, 0.144
+POST = 0.2
+"""Width of the stop [m], which leaves the view open."""
+WOOD, FOAM = (0.76, 0.60, 0.42, 1.0), (0.93, 0.94, 0.96, 1.0)
+STIFFNESS = {"wood": 1e6, "styrofoam": 3e4}
+SHEETS = 0.2
+"""Thickness of the styrofoam [m], the deepest a tool may sink."""
+PLATE = 0.2
+"""Half thickness of the touched plates, and their overlap [m]."""
+ABOVE_STOP = 1.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PalletsParams:
+    """Parameters of `pallets`.
+
+    Attributes:
+        surface: "wood" or "styrofoam", the cover of stack and stop.
+        stiffness: of both surfaces [N/m, 0 to 5e6]; 0 for the surface's own, 1e6 of wood and 3e4 of styrofoam.
+        friction: Coulomb coefficient [0 to 1].
+        pallets: number in the stack; its top is 0.144 m higher with each, styrofoam included [1 to 6].
+        plate_mass: mass that moves with each surface [kg, 10kg to 200kg].
+        damping_ratio: of that mass on its spring [0.1 to 2].
+        above: nominal height of the tool over the stack [m, 1mm to 0.8m].
+        away: nominal distance of the tool from the stop [m, 1mm to 0.8m].
+        tolerance: distance from the undeflected corner that counts as reached [m, 10um to 100mm]. In styrofoam the tool
+            may also be deeper, by less than the sheets' thickness.
+    """
+
+    surface: Literal["wood", "styrofoam"] = "wood"
+    stiffness: float = 0.0
+    friction: float = 0.3
+    pallets: int = 3
+    plate_mass: float = 40.0
+    damping_ratio: float = 0.5
+    above: float = 0.35
+    away: float = 0.45
+    tolerance: float = 0.01
+
+
+def build(params: PalletsParams) -> Scene:
+    """The scene, with the ground at z = 0. The stop touches the tool at x = 0.5 m."""
+    stiffness = params.stiffness or STIFFNESS[params.surface]
+    require(
+        "pallets",
+        {
+            "1e3 <= stiffness N/m, or 0 for the surface's own": stiffness >= 1e3,
+            "a natural frequency of the surfaces below 60 Hz (stiffness over plate_mass below 1.42e5 1/s^2)":
+                stiffness < 1.42e5 * params.plate_mass,
+        },
+        params,
+    )  # fmt: skip
+    top, face = params.pallets * STEP, 0.5 + RADIUS
+    corner = np.array([face - RADIUS, 0.0, top + RADIUS])
+
+    def distance(state: State) -> Float:
+        return norm((state.tip.position - corner)[..., [0, 2]])
+
+    def there(state: State) -> NDArray[np.bool_]:
+        return distance(state) < params.tolerance
+
+    def sunk_in(state: State) -> NDArray[np.bool_]:
+        left = (corner - state.tip.position)[..., [0, 2]] * [1.0, -1.0]  # distance left to stop and stack
+        reached: NDArray[np.bool_] = np.all((left < params.tolerance) & (left > -SHEETS), axis=-1)
+        return reached
+
+    def sprung(name: str, axis: Vector, geoms: tuple[Geom, ...]) -> Sprung:
+        return Sprung(
+            name=name, geoms=geoms, axis=axis, stiffness=stiffness, mass=params.plate_mass,
+            damping_ratio=params.damping_ratio,
+        )  # fmt: skip
+
+    grey, behind, high = (0.45, 0.48, 0.52, 1.0), face + 2.0 * _cover(params.surface), 0.5 * (top + ABOVE_STOP)
+    wall = _drawn((0.06, 0.5 * POST, high), (behind + 0.07, 0.0, high), grey)
+    over_stack, by_stop = ({"start.offset_x": sign * 0.2, "start.offset_z": sign * 0.15} for sign in (-1.0, 1.0))
+    return Scene(
+        name="pallets",
+        fixture=(*_stack(top, params.surface), wall),
+        sprung=(
+            sprung("stack", (0.0, 0.0, 1.0), _top(top, face, params.surface)),
+            sprung("stop", (1.0, 0.0, 0.0), _face(top, face, params.surface)),
+        ),
+        tool=Tool(
+            geoms=(Geom(kind="sphere", size=(RADIUS,), rgba=TOOL_COLOUR),), mass=1e-3, center_of_mass=(0.0, 0.0, 0.0),
+            inertia=(1e-6, 1e-6, 1e-6), frames={"wrist": (0.0, 0.0, 0.0), "tip": (0.0, 0.0, 0.0)},
+        ),
+        friction=params.friction,
+        start_tip=(float(corner[0]) - params.away, 0.0, float(corner[2]) + params.above),
+        start_quaternion=TOOL_DOWN,
+        goal=sunk_in if params.surface == "styrofoam" else there,
+        goal_error=lambda state: (distance(state), np.zeros(len(state.tip.position))),
+        task=Task(
+            direction=(float(np.sqrt(0.5)), 0.0, -float(np.sqrt(0.5))), hand="sliding", starts=(over_stack, by_stop),
+            done=sunk_in,
+        ),
+    )  # fmt: skip
+
+
+def _top(top: float, face: float, surface: str) -> tuple[Geom, ...]:
+    """The plate under the tool, which overlaps the stop so that nothing slips between."""
+    low, high = face - LENGTH - PLATE, face + PLATE
+    solid = Geom(
+        kind="box", size=(0.5 * (high - low), 0.5 * WIDTH, PLATE), position=(0.5 * (low + high), 0.0, top - PLATE),
+        visible=False,
+    )  # fmt: skip
+    middle = face - 0.5 * LENGTH
+    if surface == "styrofoam":
+        half = 0.5 * SHEETS
+        sheets = [_drawn((0.5 * LENGTH, 0.5 * WIDTH, half), (middle, 0.0, top - half), FOAM)]
+    else:
+        boards = (-0.33, -0.165, 0.0, 0.165, 0.33)
+        sheets = [_drawn((0.5 * LENGTH, 0.06, 0.011), (middle, y, top - 0.011), WOOD) for y in boards]
+    return (solid, *sheets)
+
+
+def _face(top: float, face: float, surface: str) -> tuple[Geom, ...]:
+    """The stop's plate, which reaches as deep below the stack's top as styrofoam yields."""
+    low, high = top - SHEETS - PLATE, top + ABOVE_STOP
+    size, middle = (PLATE, 0.5 * POST, 0.5 * (high - low)), 0.5 * (low + high)
+    solid = Geom(kind="box", size=size, position=(face + PLATE, 0.0, middle), visible=False)
+    thick, colour = _cover(surface), FOAM if surface == "styrofoam" else WOOD
+    half = 0.5 * ABOVE_STOP
+    return (solid, _drawn((thick, 0.5 * POST, half), (face + thick, 0.0, top + half), colour))
+
+
+def _drawn(size: Vector, position: Vector, colour: tuple[float, float, float, float]) -> Geom:
+    return Geom(kind="box", size=size, position=position, rgba=colour, collide=False)
+
+
+def _cover(surface: str) -> float:
+    """Half thickness of the stop's cover [m]."""
+    return 0.5 * SHEETS if surface == "styrofoam" else 0.011
+
+
+def _stack(top: float, surface: str) -> tuple[Geom, ...]:
+    ground = Geom(
+        kind="box", size=(2.5, 1.2, 0.01), position=(-0.9, 0.0, -0.01), rgba=(0.62, 0.64, 0.66, 1.0), collide=False
+    )
+    height = top - (SHEETS if surface == "styrofoam" else 0.022)
+    middle, count = 0.5 + RADIUS - 0.5 * LENGTH, max(1, round(height / STEP))
+    parts = [ground]
+    for level in range(count):
+        low, step = level * height / count, height / count
+        parts += [_drawn((0.5 * LENGTH, 0.05, 0.5 * step - 0.011), (middle, y, low + 0.5 * step - 0.011), WOOD)
+                  for y in (-0.34, 0.0, 0.34)]  # fmt: skip
+        deck = (0.80, 0.65, 0.47, 1.0)
+        parts.append(_drawn((0.5 * LENGTH, 0.5 * WIDTH, 0.011), (middle, 0.0, low + step - 0.011), deck))
+    return tuple(parts)

@@ -1,0 +1,121 @@
+"""Leave one out: what each demonstration contributes to a learned direction, and which contradicts the others.
+
+The skill is learned again without each demonstration. Compared are the direction, the share of the data that it
+explains (`explained`), the size of the set of directions that explain as much (`feasible_solid_angle_sr`, as the half
+opening of a cone), and whether the learner leaves the direction open, as all went one way (`ambiguous`). A
+demonstration contradicts the others if only without it there is a direction, or if it lowers the share by
+`CONTRADICTS`. It is needed if without it there is no direction, or an open one, or if the
+cone is `NEEDED` times as wide.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import acos, degrees, pi
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from skillframe.api.learning import LearnedSkill
+from skillframe.demonstration.record import Demonstration
+from skillframe.document import file
+from skillframe.errors import InputError
+from skillframe.extend.records import Document, LearnOptions, SkillType
+
+CONTRADICTS, NEEDED = 0.2, 1.5
+PARTS = (("translation", "push"), ("rotation", "turn"))
+
+
+class Found(NamedTuple):
+    """Compared figures of one part.
+
+    Attributes:
+        direction: (3,) or None.
+        explained: share of the data that it explains.
+        cone: half opening of the directions that explain as much [rad].
+        open: whether the demonstrations leave it open.
+    """
+
+    direction: np.ndarray[Any, np.dtype[np.float64]] | None
+    explained: float | None
+    cone: float | None
+    open: bool = False
+
+
+def left_out(
+    learned: LearnedSkill, demonstrations: Sequence[Demonstration], kind: SkillType, options: LearnOptions
+) -> list[str]:
+    """A sentence for each demonstration and each part that has a direction, with it or without it.
+
+    Args:
+        learned: from all of them.
+        demonstrations: two or more.
+        kind: of the skill.
+        options: as it was learned.
+
+    Raises:
+        InputError: fewer than two, or a kind of skill that is not one motion with a direction.
+    """
+    if len(demonstrations) < 2:
+        raise InputError("--leave-one-out", "compares demonstrations, and there is one", "give two or more")
+    if len(learned.phases) != 1 or not any(part in learned.phases[0] for part, _ in PARTS):
+        raise InputError("--leave-one-out", f"{kind.name} is not one motion with a direction", "leave it out")
+    lines = []
+    for i, demonstration in enumerate(demonstrations):
+        name = demonstration.source or f"demonstration {i + 1}"
+        others = [d for j, d in enumerate(demonstrations) if j != i]
+        try:
+            without = file.learned(kind, others, options)
+        except InputError as error:
+            lines.append(f"without {name} nothing is learned: {error}")
+            continue
+        told = [said(name, word, found(learned.document, part), found(without, part)) for part, word in PARTS]
+        lines += [text for text in told if text]
+    return lines
+
+
+def found(document: Document, part: str) -> Found:
+    """The figures of one part of a document's first phase."""
+    values = document["phases"][0].get(part) or {}
+    direction, evidence = values.get("desired_direction"), values.get("evidence") or {}
+    area = evidence.get("feasible_solid_angle_sr")
+    cone = None if area is None else acos(max(1.0 - area / (2.0 * pi), -1.0))
+    return Found(
+        None if direction is None else np.array(direction),
+        evidence.get("explained"),
+        cone,
+        bool(evidence.get("ambiguous")),
+    )
+
+
+def said(name: str, word: str, whole: Found, without: Found) -> str:
+    """The effect of leaving one out on a part, in words. "" if there is no direction either way.
+
+    Args:
+        name: of the demonstration.
+        word: "push" or "turn".
+        whole: with it.
+        without: without it.
+    """
+    if whole.direction is None:
+        contradicts = f"{name} contradicts the others: without it there is a {word}, with it none"
+        return "" if without.direction is None else contradicts
+    if without.direction is None:
+        return f"{name} is needed: without it there is no {word}"
+    turned = acos(float(np.clip(whole.direction @ without.direction, -1.0, 1.0)))
+    by = round(degrees(turned))
+    moves = f"without it the {word} turns by {by} degree{'s' * (by != 1)}"
+    shares = whole.explained, without.explained
+    if shares[0] is not None and shares[1] is not None and shares[1] - shares[0] > CONTRADICTS:
+        return (
+            f"{name} contradicts the others: with it the {word} explains {100.0 * shares[0]:.0f} % of what was shown, "
+            f"without it {100.0 * shares[1]:.0f} %; {moves}"
+        )
+    if without.open and not whole.open:
+        return f"{name} is needed: without it all others went one way, and leave the {word} open; {moves}"
+    if whole.cone is not None and without.cone is not None and without.cone > NEEDED * whole.cone:
+        return (
+            f"{name} is needed: with it the {word} is known to about {degrees(whole.cone):.0f} degrees, without it to "
+            f"{degrees(without.cone):.0f}; {moves}"
+        )
+    return f"{name} agrees: {moves}"

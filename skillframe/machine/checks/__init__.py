@@ -1,1 +1,0 @@
-"""What is worth knowing about a hydraulic machine before it runs."""

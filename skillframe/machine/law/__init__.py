@@ -1,1 +1,0 @@
-"""The control law of hydraulic machines: virtual decomposition control, readable and compiled."""

@@ -1,1 +1,0 @@
-"""Signals in the loop: delay lines, rate filters and Kalman filters."""

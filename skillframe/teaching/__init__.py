@@ -1,1 +1,0 @@
-"""Simulated people who demonstrate: hand on the tool, blindfolded, or at a teleoperation station."""
