@@ -47,7 +47,7 @@ def _documents(pegs: list[Demonstration], blind: tuple[Demonstration, ...]) -> d
         for each, file in zip(blind, files, strict=True):
             write_demonstration(each, Path(file))
         ways: dict[str, dict[str, Any]] = {
-            OURS: {"blind": files}, NULL: {"search": False}, SPIRAL: {},  # without blind demonstrations
+            OURS: {"blind": files}, NULL: {"tries": 0}, SPIRAL: {},  # without blind demonstrations
         }  # fmt: skip
         return {
             name: learned(registry().skill("seat"), pegs, LearnOptions(settings={"shift": BESIDE_M[1], **own}))
