@@ -12,9 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from skillframe.cosim import CosimSettings, Master, Motion, coupling_numbers, require_stable
-from skillframe.fmu.actuator import ActuatorSpec
-from skillframe.fmu.build import build_fmu
-from skillframe.fmu.opening import open_actuators
+from skillframe.fmu import ActuatorSpec, build_fmu, open_actuators
 
 STALL, DRAG, MASS, GRAVITY, COMMAND = 2000.0, 500.0, 120.0, 9.81, 0.8
 WINCH = Path(__file__).parent / "winch"  # fmu.toml declares the variables, winch.c computes the force

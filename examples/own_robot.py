@@ -10,9 +10,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 from skillframe import learn, record, run
-from skillframe.robot import load_robot
-from skillframe.robot.audit import audit
-from skillframe.robot.model import load_model
+from skillframe.robot import audit, load_model, load_robot
 
 # Of each joint: its axis; length [m] and mass [kg] of the link behind it.
 LINKS = [("z", 0.15, 4.0), ("y", 0.42, 8.0), ("y", 0.40, 4.0), ("y", 0.08, 1.5), ("x", 0.06, 1.2), ("z", 0.06, 0.5)]

@@ -30,7 +30,7 @@ RARE_TICKS = 100
 """Ticks between checks of dtypes and of mirroring rotations: 100 ms at 1 kHz."""
 ROTATION_SLACK = 1e-3
 """Largest entry of R^T R - 1: far above the rounding of an hour's products, or of single precision."""
-Answer = TypeVar("Answer")
+Answer = TypeVar("Answer")  #: what a method of a skill returns
 _EYE = np.eye(3)
 
 

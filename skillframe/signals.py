@@ -35,7 +35,7 @@ from skillframe.frames import Float
 
 CORNER = 25.0
 """Noise of a wrist sensor [N, Nm] and corner [Hz] at 1 kHz."""
-CHUNK, OVERLAP = 4_000, 2_000
+CHUNK, OVERLAP = 4_000, 2_000  #: samples of a chunk, and of its overlap with the next
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

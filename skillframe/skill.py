@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from skillframe.frames import Float, Pose
 
-Reasons = NDArray[np.object_]
+Reasons = NDArray[np.object_]  #: why each trial ended, or None
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
 

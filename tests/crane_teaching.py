@@ -19,7 +19,7 @@ from skillframe.demonstration.record import Demonstration
 from skillframe.document.file import learned
 from skillframe.execution.prepare import load_robot_model, load_world
 from skillframe.execution.trace import Trace
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend import Document, LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import norm
 

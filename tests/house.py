@@ -36,7 +36,7 @@ class File(NamedTuple):
 
     @property
     def module(self) -> str:
-        name = re.sub(r"^plugins/[^/]+/src/", "", self.path).removesuffix(".py").replace("/", ".")
+        name = re.sub(r"^plugins/[^/]+/src/", "", self.path).removesuffix("i").removesuffix(".py").replace("/", ".")
         return name.removesuffix(".__init__")
 
     @property
@@ -46,8 +46,8 @@ class File(NamedTuple):
 
 @cache
 def library() -> tuple[File, ...]:
-    """The files of the core and of the plug-ins, without the template of new plug-ins."""
-    found = [*ROOT.glob("skillframe/**/*.py"), *ROOT.glob("plugins/*/src/**/*.py")]
+    """The files of the core, with its lists of public names, and of the plug-ins, without the template of new ones."""
+    found = [*ROOT.glob("skillframe/**/*.py"), *ROOT.glob("skillframe/**/*.pyi"), *ROOT.glob("plugins/*/src/**/*.py")]
     return tuple(_file(path) for path in sorted(found) if not {"plugin_template", "_data"} & set(path.parts))
 
 
@@ -79,12 +79,12 @@ def imports() -> dict[str, set[str]]:
         for node in ast.walk(file.tree):
             if isinstance(node, ast.Import):
                 named |= {alias.name for alias in node.names}
-            elif isinstance(node, ast.ImportFrom) and node.module:
-                full = {alias: f"{node.module}.{alias.name}" for alias in node.names}
-                named |= {name if name in modules else node.module for name in full.values()}
+            elif isinstance(node, ast.ImportFrom):
+                home = ".".join([file.module] * node.level + [node.module] * bool(node.module))
+                named |= {whole if (whole := f"{home}.{alias.name}") in modules else home for alias in node.names}
             elif isinstance(node, ast.Constant) and isinstance(node.value, str):
                 named |= {node.value.partition(":")[0]} if re.fullmatch(r"[\w.]+:[\w.]+", node.value) else set()
-        found[file.module] = (named & modules) - {file.module}
+        found[file.module] = found.get(file.module, set()) | (named & modules) - {file.module}
     found["skillframe"] = set()  # its public names are imported on use
     return found
 
@@ -167,7 +167,7 @@ def figures() -> dict[str, int]:
     files, core = library(), [file for file in library() if file.core]
     once = [name for file in files for name, count in private_functions(file).items() if count == 1]
     tests = [*ROOT.glob("tests/**/*.py"), *ROOT.glob("plugins/*/tests/**/*.py"), ROOT / "conftest.py"]
-    file_names = Counter(Path(file.path).name for file in files if not file.path.endswith("__init__.py"))
+    file_names = Counter(Path(file.path).name for file in files if "__init__" not in file.path)
     return {
         "core_lines": sum(file.lines for file in core),
         "core_files": len(core),

@@ -13,7 +13,8 @@ from skillframe.api.inputs import Demonstrations, File, demonstrations_of
 from skillframe.demonstration.record import Demonstration
 from skillframe.document import file
 from skillframe.errors import InputError, SkillframeWarning
-from skillframe.extend.records import Document, Explanation, Illustration, LearnOptions, SkillType, no_progress
+from skillframe.extend.outputs import Explanation, Illustration, no_progress
+from skillframe.extend.records import Document, LearnOptions, SkillType
 from skillframe.extend.registry import registry
 from skillframe.skill import Skill
 

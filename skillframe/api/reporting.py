@@ -12,7 +12,7 @@ from skillframe.api.inputs import File
 from skillframe.api.running import SingleRun
 from skillframe.errors import InputError
 from skillframe.execution.trace import Trace
-from skillframe.extend.records import no_progress
+from skillframe.extend.outputs import no_progress
 from skillframe.extend.registry import registry
 
 Results = CampaignResults | SingleRun | Trace | File

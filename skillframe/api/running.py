@@ -20,7 +20,7 @@ from skillframe.execution.executor import Setup, require_starts, simulate
 from skillframe.execution.prepare import prepare
 from skillframe.execution.result import ArmsResult
 from skillframe.execution.trace import ScoreFailed, Trace, about, score_notes, scores_of
-from skillframe.extend.records import Moment, no_progress
+from skillframe.extend.outputs import Moment, no_progress
 from skillframe.extend.registry import registry
 from skillframe.robot.audit import resistance_note
 from skillframe.robot.link_checks import guess_note

@@ -1,1 +1,5 @@
 """Campaigns: many trials over declared uncertainty, stored so that nothing is lost."""
+
+from lazy_loader import attach_stub
+
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -42,6 +42,7 @@ from skillframe.extend.registry import BadPlugin, PluginConflict
 
 __all__ = ["Answer", "CampaignError", "Died", "Driver", "Evaluate", "InProcess", "Pool", "Raised", "chunk_size"]
 
+#: how a worker died, in words
 WHY = {"killed": "was killed", "time limit": "made no progress for too long", "memory": "went over its memory limit"}
 
 
@@ -270,7 +271,7 @@ class Lent:
         """Do nothing. `Keeper` closes the pool."""
 
 
-Evaluate = Callable[[ChunkJob], list[Row]]
+Evaluate = Callable[[ChunkJob], list[Row]]  #: runs the trials of a chunk
 FILES = frozenset(f"skillframe.fmu.{name}" for name in ("allow", "build", "extract", "foreign", "library"))
 """Modules that turn an FMU file into something that runs; they do not depend on samples."""
 OLD_SIGNS = (
@@ -302,7 +303,7 @@ class Raised(NamedTuple):
     memory: bool = False
 
 
-Answer = list[Row] | Died | Raised
+Answer = list[Row] | Died | Raised  #: what a worker returns for a chunk: its rows, or how it failed
 
 
 @contextmanager

@@ -43,9 +43,10 @@ from skillframe.files.documents import read_json
 from skillframe.robot.meshes import LARGEST_FILE, mesh_names, resolve_mesh
 from skillframe.robot.spec import robot_folder
 
+#: files of a campaign's folder: its declaration, and the scene of its first trial
 CAMPAIGN, SCENE = "campaign.toml", "scene.json"
-COPIES = ("skills", "robots", "worlds")
-Describe = Callable[[CampaignSpec], dict[str, Any]]
+COPIES = ("skills", "robots", "worlds")  #: subfolders with copies of what a campaign used
+Describe = Callable[[CampaignSpec], dict[str, Any]]  #: scene of a campaign as a JSON object
 
 
 def prepare(spec: CampaignSpec, out: Path, describe: Describe, params: type) -> CampaignSpec:
@@ -371,4 +372,4 @@ def holder(folder: Path) -> tuple[int, str] | None:
         os.close(descriptor)
 
 
-SUMMARY = "summary.json"
+SUMMARY = "summary.json"  #: file of a campaign's summary

@@ -28,7 +28,7 @@ from skillframe.campaign.spec import CampaignSpec
 from skillframe.document.file import parse_source
 
 LIBRARIES = ("skillframe", "numpy", "scipy", "mujoco", "pin")
-CODE = " code"
+CODE = " code"  #: suffix of a plug-in's name in the table of hashes, for the hash of its code
 MACHINE = ("platform", "processor")
 
 

@@ -24,9 +24,9 @@ from skillframe.execution.trace import SHARE_JOINTS
 from skillframe.files.documents import shown
 from skillframe.skill import Ended
 
-Row = dict[str, Any]
+Row = dict[str, Any]  #: a trial by column
 MEASURES = ("duration_s", "peak_force_n", "final_error_m", "final_error_rad")
-OUTCOME = ("success", "failure", *MEASURES)
+OUTCOME = ("success", "failure", *MEASURES)  #: columns of a trial's outcome
 JUDGED_MEASURES = (
     "peak_force_filtered_n", "peak_torque_share", "peak_speed_share", "peak_force_10ms_n", "peak_range_share",
     "distance_to_collision_m",
@@ -38,15 +38,16 @@ JUDGED = (
 )  # fmt: skip
 """Columns added after version 0.1."""
 EXTRA = ("status", "reason")
+#: how a file may write true and false
 TRUTH = {"1": True, "true": True, "1.0": True, "0": False, "false": False, "0.0": False}
-SOURCE, REAL = "source", "real"
+SOURCE, REAL = "source", "real"  #: column that says where a trial ran, and its value for a real robot
 """Column for the origin of a row, and its value for a real robot."""
 ENDED_BY = "ended_by"
 REFUSED = Ended.START.value
 """`ended_by` of a row that is no trial. Its `success` is empty in results.csv."""
 LEFT_OUT = "left_out_after"
 """Column of a race's results.csv: trials that a skill ran before it was left out; empty for the others."""
-SCORE = "score."
+SCORE = "score."  #: prefix of the columns of scores
 SECOND = "second."
 """Prefix of columns of second parts: how far each had moved at the end."""
 TRACE = "trace"

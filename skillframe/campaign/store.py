@@ -28,7 +28,7 @@ from skillframe.errors import InputError
 from skillframe.files import writing_whole
 from skillframe.files.documents import parse_json
 
-ROWS, RESULTS = "rows.jsonl", "results.csv"
+ROWS, RESULTS = "rows.jsonl", "results.csv"  #: files of the trials: as they end, and in order
 FORMAT, VERSION = "skillframe.campaign", 1
 ROWS_VERSION = 3
 """Version 1 had no checksums; 2 had a JSON object with all columns per row."""

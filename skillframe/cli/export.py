@@ -11,7 +11,7 @@ from skillframe.cli import options
 from skillframe.cli.options import WHOLE
 
 if TYPE_CHECKING:
-    from skillframe.extend.records import ExporterType
+    from skillframe.extend.outputs import ExporterType
     from skillframe.frames import Float
 
 

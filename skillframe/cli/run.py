@@ -15,7 +15,7 @@ from skillframe.cli.output import note
 from skillframe.config.units import DURATION, TRACE_RATE
 
 if TYPE_CHECKING:
-    from skillframe.extend.records import OutputType
+    from skillframe.extend.outputs import OutputType
 
 FORCES = ("peak_force_filtered_n", "peak_force_10ms_n", "ended_by", "goal_reached", "ended_itself")
 APART = "distance_to_collision_m"

@@ -81,7 +81,7 @@ def command(
     one = [ONE_FOUND] if count == 1 and phases is None and not _pushes(policy.phases[0]) else []
     tell([made, *policy.words, *one])
     if page is not None:
-        from skillframe.extend.records import Segmentation, no_progress
+        from skillframe.extend.outputs import Segmentation, no_progress
 
         cut = Segmentation(policy.document, policy.words, demonstrations, _line())
         registry().output("boundaries").write(cut, page, no_progress)

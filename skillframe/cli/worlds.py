@@ -114,7 +114,8 @@ def _point(point: tuple[float, ...]) -> str:
 
 
 def _draw(world: str | None, folder: Path) -> None:
-    from skillframe.extend.records import make_scene, no_progress
+    from skillframe.extend.outputs import no_progress
+    from skillframe.extend.records import make_scene
     from skillframe.extend.registry import registry
 
     draw = registry().output("scene").write

@@ -251,13 +251,16 @@ class Quantity(NamedTuple):
     unfit: Callable[[Any, Any], tuple[str, str] | None] | None = None
 
 
+#: longest run
 DURATION = Quantity(
     "duration_s", "s", 20.0, "longest run in simulated seconds",
     Range(1e-3, 86400.0, "from one tick of a usual controller to a day"), option="--duration",
 )  # fmt: skip
+#: samples of a trace
 TRACE_RATE = Quantity(
     "rate_hz", "Hz", 100.0, "rate of the trace", Range(0.01, 1e5, "as no controller here is faster"), option="--rate"
 )
+#: centre of compliance
 CENTER = Quantity(
     "coc", "m", None, "each coordinate of the centre of compliance in the tool frame; as learned otherwise",
     Range(-3.0, 3.0, "as no tool is longer"), option="--coc",

@@ -77,7 +77,7 @@ QUIET_FORCE, QUIET_TORQUE = 0.5, 0.03
 CALMING = 4.0
 """Factor on the damping while contact rings. It keeps contact stable up to four times the declared stiffness."""
 QUIET = np.array([QUIET_FORCE, QUIET_TORQUE]) ** 2
-MASS = np.diag(np.repeat([VIRTUAL_MASS, VIRTUAL_INERTIA], 3))
+MASS = np.diag(np.repeat([VIRTUAL_MASS, VIRTUAL_INERTIA], 3))  #: (6, 6) virtual mass matrix [kg, kg m2]
 
 
 class Bounds(NamedTuple):

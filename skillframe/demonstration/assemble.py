@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration import checks, stalls
+from skillframe.demonstration import checks
 from skillframe.demonstration.checks import GAP, refuse_contradiction
 from skillframe.demonstration.columns import (
     CANONICAL,
@@ -51,6 +51,7 @@ from skillframe.demonstration.faults import fault
 from skillframe.demonstration.faults.find import remembered
 from skillframe.demonstration.options import ReadOptions, check_meta, nested
 from skillframe.demonstration.record import Demonstration, resolve_point
+from skillframe.demonstration.stalls import moved as moved_stalls
 from skillframe.demonstration.table import read_table
 from skillframe.errors import InputError
 from skillframe.frames import (
@@ -80,7 +81,7 @@ def assemble(
     rate = options.rate or _meta_rate(source, meta, columns)
     pose = _clocked(select_arm(columns, options.arm), rate, notes)
     zero = -float(pose["t"][0]) if options.zero_time else 0.0  # one shift for both files
-    meta = fault.moved(stalls.moved(meta, zero, source), zero, source)
+    meta = fault.moved(moved_stalls(meta, zero, source), zero, source)
     if not pose.has(QUATERNION):
         meta = {**meta, "quaternion": "xyzw"}  # computed here, so its order is known
     pose = _checked_pose(_shifted(pose, zero), options, notes)

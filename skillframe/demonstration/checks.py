@@ -192,10 +192,10 @@ def refuse_dead_wrench(columns: Columns, meta: Mapping[str, Any]) -> None:
 
 
 SAMPLES = 400
-SHARES = (0.25, 0.5, 0.75, 1.0)
-LEAST_TURN = np.deg2rad(20.0)
-LEAST_RESIDUAL, RESIDUAL_RATIO = 0.5, 5.0
-LEAST_PATH, WORK_COSINE = 0.02, 0.3
+SHARES = (0.25, 0.5, 0.75, 1.0)  #: parts of a recording that are compared with the whole
+LEAST_TURN = np.deg2rad(20.0)  #: of the tool, for its weight to show [rad]
+LEAST_RESIDUAL, RESIDUAL_RATIO = 0.5, 5.0  #: of a fit of weight and bias [N], and to that of another convention
+LEAST_PATH, WORK_COSINE = 0.02, 0.3  #: in contact [m], and cosine of force and motion: friction brakes
 LEAST_WEIGHT, MOST_WEIGHT = 2.0, 981.0
 """Range of a tool's weight if none is declared [N]; more than 100 kg is a force, or another unit."""
 LEVEL_TIME = 0.25

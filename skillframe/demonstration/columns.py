@@ -19,16 +19,17 @@ from skillframe.demonstration.table import Table
 from skillframe.errors import InputError
 from skillframe.frames import Float, matrix_from_quaternion, quaternion_from_matrix, rotation_matrix
 
-POSITION = ("px", "py", "pz")
-QUATERNION = ("qx", "qy", "qz", "qw")
-FORCE, TORQUE = ("fx", "fy", "fz"), ("tx", "ty", "tz")
-WRENCH = FORCE + TORQUE
-EULER = ("roll", "pitch", "yaw")
-ROTATION_VECTOR = ("rvx", "rvy", "rvz")
-MATRIX = tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))
+POSITION = ("px", "py", "pz")  #: columns of the position [m]
+QUATERNION = ("qx", "qy", "qz", "qw")  #: columns of the orientation, scalar last
+FORCE, TORQUE = ("fx", "fy", "fz"), ("tx", "ty", "tz")  #: columns of the force [N] and torque [Nm]
+WRENCH = FORCE + TORQUE  #: columns of the wrench [N, Nm]
+EULER = ("roll", "pitch", "yaw")  #: columns of the fixed-axis angles about x, y, z [rad]
+ROTATION_VECTOR = ("rvx", "rvy", "rvz")  #: columns of the rotation vector [rad]
+MATRIX = tuple(f"r{i}{j}" for i in (1, 2, 3) for j in (1, 2, 3))  #: columns of the rotation matrix, row by row
 CANONICAL = ("t", *POSITION, *QUATERNION, *WRENCH)
-SECONDS, NANOSECONDS = "sec", "nsec"
-KNOWN = (*CANONICAL, *EULER, *ROTATION_VECTOR, *MATRIX)
+SECONDS, NANOSECONDS = "sec", "nsec"  #: columns of a time stamp in two parts
+KNOWN = (*CANONICAL, *EULER, *ROTATION_VECTOR, *MATRIX)  #: all columns that are read
+#: quantity of each column
 QUANTITY = {
     "t": "time", **dict.fromkeys(POSITION, "length"), **dict.fromkeys((*EULER, *ROTATION_VECTOR), "angle"),
     **dict.fromkeys(FORCE, "force"), **dict.fromkeys(TORQUE, "torque"),

@@ -31,7 +31,7 @@ from skillframe.errors import InputError
 from skillframe.frames import Float, norm
 
 SIGMAS, SHARE = 6.0, 0.1
-HOLD, LEVEL_TIME = 0.05, 0.25
+HOLD, LEVEL_TIME = 0.05, 0.25  #: least duration of a contact, and of free air before it [s]
 
 
 class Contact(NamedTuple):
@@ -174,7 +174,7 @@ def _runs(mask: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[tuple[int, i
     return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
 
 
-WINDOW, LEAST_SAMPLES = 0.25, 10
+WINDOW, LEAST_SAMPLES = 0.25, 10  #: of a noise figure: stretch [s] and samples
 FLOOR = np.repeat([1e-4, 1e-6], 3)
 """Least noise assumed [N, Nm]; simulated or filtered channels need a positive figure too."""
 

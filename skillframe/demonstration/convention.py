@@ -125,13 +125,14 @@ def _numbers(path: Path, content: Mapping[str, Any], key: str, count: int) -> Fl
     return found
 
 
-GRAVITY = np.array([0.0, 0.0, -9.81])
+GRAVITY = np.array([0.0, 0.0, -9.81])  #: (3,) in base axes [m/s2]
 FRAMES, SIGNS = ("base", "tool"), ("environment", "teacher")
 KEYS = ("frame", "point", "sign", "includes_tool_weight", "tool_mass", "tool_com", "calibration")
 NO_TORQUE = (
     "no torque was measured, so tx, ty, tz are 0: translation can be learned; who turned the tool, and where it was "
     "touched, cannot"
 )
+#: convention of the wrench inside the library
 STANDARD = {"frame": "base", "point": "tool", "sign": "environment", "includes_tool_weight": False}
 UNMEASURED = "unmeasured"
 """Metadata key: names of wrench channels that were not measured, whose zeros have no meaning."""

@@ -24,6 +24,7 @@ from typing import Any, Literal
 from skillframe.config import build, parse_setting, read_toml
 from skillframe.errors import InputError, UnknownName
 
+#: factor to SI by unit, for each quantity
 SCALES: Mapping[str, Mapping[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     "length": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254},

@@ -32,7 +32,7 @@ from skillframe.frames import Float, matrix_from_quaternion, norm, rotation_vect
 
 KEY = "stalls"
 """Metadata key of stalls found when the recording was first read: [{what, start, stop}] [s]."""
-POSE = "pose"
+POSE = "pose"  #: name of a stall of the whole pose
 LEAST_TIME = 0.25
 LEAST_NOISE = np.repeat([1e-3, 1e-5], 3)  # [N, Nm]
 LEVEL_TIME = 0.25

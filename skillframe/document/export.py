@@ -27,8 +27,9 @@ import numpy as np
 
 from skillframe.document.frame import read_frame
 from skillframe.errors import InputError, SkillframeError
+from skillframe.extend.outputs import Axes, ExporterType, MovingImpedance
 from skillframe.extend.plugin import BadPlugin
-from skillframe.extend.records import Axes, Document, ExporterType, MovingImpedance
+from skillframe.extend.records import Document
 from skillframe.frames import Float
 
 DIRECTIONS = ("x", "y", "z")

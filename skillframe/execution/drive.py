@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from skillframe.execution.result import Result
 from skillframe.execution.trace import Trace
-from skillframe.extend.records import DriveType
+from skillframe.extend.hardware import DriveType
 from skillframe.frames import Float
 from skillframe.robot.model import RobotModel
 from skillframe.robot.spec import Limits
@@ -30,7 +30,7 @@ from skillframe.world.plant import Plant
 from skillframe.world.quantities import SensorSettings
 from skillframe.world.scene import Scene, State
 
-Trials = NDArray[np.int64]
+Trials = NDArray[np.int64]  #: indices of trials
 
 
 class Shares(NamedTuple):

@@ -31,7 +31,7 @@ from skillframe.world.plant import START_DEPTH, Plant
 
 __all__ = ["Loop", "Result", "Setup", "begin", "simulate"]
 
-RAMP_S = 0.05
+RAMP_S = 0.05  #: duration of the ramp of stiffness at the start [s]
 APART_TICKS = 100
 """Ticks between two distance measurements of bodies that must not touch; one costs about as much as a tick."""
 

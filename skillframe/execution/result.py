@@ -19,9 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.execution.trace import SHARE_JOINTS as SHARE_JOINTS
-from skillframe.execution.trace import SHARES as SHARES
-from skillframe.execution.trace import Trace
+from skillframe.execution.trace import SHARE_JOINTS, SHARES, Trace
 from skillframe.frames import Float
 from skillframe.skill import Reasons, no_reasons
 
@@ -105,7 +103,7 @@ class ArmsResult(Result):
     arm_traces: list[dict[str, Trace]] | None = None
 
 
-SIMULATED = "in simulation"
+SIMULATED = "in simulation"  #: how a report calls a run in simulation
 PEAK = f"peak contact force {SIMULATED}"
 """Name of `peak_force_n`."""
 MEAN = "contact force in simulation over 10 ms"

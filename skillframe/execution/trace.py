@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from skillframe.errors import InputError, SkillframeError
-from skillframe.extend.records import ScoreType
+from skillframe.extend.outputs import ScoreType
 from skillframe.extend.registry import registry
 from skillframe.files import write_whole
 from skillframe.files.documents import json_member, read_arrays
@@ -159,7 +159,7 @@ def _check_numbers(path: Path, arrays: dict[str, Float]) -> None:
         raise InputError(path, "its time does not increase", "write the trace again")
 
 
-SHARES = ("peak_torque_share", "peak_speed_share", "peak_range_share")
+SHARES = ("peak_torque_share", "peak_speed_share", "peak_range_share")  #: columns of the largest share of the limits
 SHARE_JOINTS = ("peak_torque_joint", "peak_speed_joint", "peak_range_joint")
 """Names of the joints' largest shares of their limits, and of the joints."""
 LARGEST = 1e100  # larger values overflow when squared

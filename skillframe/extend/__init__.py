@@ -1,1 +1,5 @@
 """Hooks, the records that plug-ins yield, and the registry that collects them."""
+
+from lazy_loader import attach_stub
+
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

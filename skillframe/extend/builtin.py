@@ -6,8 +6,10 @@ from collections.abc import Iterable
 
 from skillframe.config import read_toml
 from skillframe.extend.contract import CONTRACT
+from skillframe.extend.hardware import DriveType, RobotType
 from skillframe.extend.hookspecs import hookimpl
-from skillframe.extend.records import DriveType, ExporterType, Lazy, ReaderType, RobotType
+from skillframe.extend.outputs import ExporterType
+from skillframe.extend.records import Lazy, ReaderType
 from skillframe.files import shipped_dirs
 
 skillframe_contract = CONTRACT

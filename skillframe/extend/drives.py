@@ -16,8 +16,8 @@ import numpy as np
 from skillframe.config import coerce, in_si, settings_of
 from skillframe.config.units import Quantity, Range, require_within
 from skillframe.errors import InputError, SkillframeError, UnknownName
+from skillframe.extend.hardware import DriveType
 from skillframe.extend.homes import homes, install_line
-from skillframe.extend.records import DriveType
 from skillframe.extend.registry import Registry, registry
 from skillframe.frames import Float
 from skillframe.robot.spec import RobotSpec

@@ -19,26 +19,26 @@ from collections.abc import Iterable
 import pluggy
 
 from skillframe.extend.contract import GROUP
-from skillframe.extend.records import (
-    AuditType,
-    CoordinatorType,
-    DriveType,
+from skillframe.extend.hardware import DriveType, LinkType, RobotType
+from skillframe.extend.outputs import (
     ExporterType,
     FolderType,
-    LinkType,
     OutputType,
-    ReaderType,
     RequirementType,
-    RobotType,
     RowType,
     ScoreType,
     SectionType,
+)
+from skillframe.extend.records import (
+    AuditType,
+    CoordinatorType,
+    ReaderType,
     SegmenterType,
     SkillType,
     TeacherType,
     WorldFileType,
     WorldType,
-)  # fmt: skip
+)
 
 hookspec = pluggy.HookspecMarker(GROUP)
 hookimpl = pluggy.HookimplMarker(GROUP)

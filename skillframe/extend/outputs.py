@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from skillframe.demonstration.record import Demonstration
     from skillframe.frames import Float
 
-Axes = Literal["base", "tool"]
+Axes = Literal["base", "tool"]  #: in which a direction is fixed
 STROKES = ("c1", "c2", "c3", "s4")
 
 
@@ -311,7 +311,7 @@ def actuator_curves(names: Sequence[str], values: Float, style: str) -> list[Cur
     ]  # fmt: skip
 
 
-Verdict = Literal["pass", "fail", "reported"]
+Verdict = Literal["pass", "fail", "reported"]  #: of a row
 Setting = float | int | str | bool
 
 

@@ -13,7 +13,7 @@ from importlib.metadata import Distribution, EntryPoint, distributions
 from typing import Any
 
 from skillframe.errors import SkillframeError, UnknownName
-from skillframe.extend import records
+from skillframe.extend import hardware, outputs, records
 from skillframe.extend.contract import GROUP
 
 RECORDS: Mapping[str, type[Any]] = {
@@ -25,16 +25,16 @@ RECORDS: Mapping[str, type[Any]] = {
     "teacher": records.TeacherType,
     "reader": records.ReaderType,
     "audit": records.AuditType,
-    "row": records.RowType,
-    "exporter": records.ExporterType,
-    "score": records.ScoreType,
-    "robot": records.RobotType,
-    "drive": records.DriveType,
-    "link": records.LinkType,
-    "section": records.SectionType,
-    "folder": records.FolderType,
-    "output": records.OutputType,
-    "requirement": records.RequirementType,
+    "row": outputs.RowType,
+    "exporter": outputs.ExporterType,
+    "score": outputs.ScoreType,
+    "robot": hardware.RobotType,
+    "drive": hardware.DriveType,
+    "link": hardware.LinkType,
+    "section": outputs.SectionType,
+    "folder": outputs.FolderType,
+    "output": outputs.OutputType,
+    "requirement": outputs.RequirementType,
 }
 """Type of the records of each kind."""
 KINDS: Mapping[str, str] = {kind: f"skillframe_{kind}s" for kind in RECORDS}

@@ -7,33 +7,7 @@ from dataclasses import asdict, dataclass, field, replace
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from skillframe.extend.hardware import DriveType as DriveType
-from skillframe.extend.hardware import LinkType as LinkType
-from skillframe.extend.hardware import RobotType as RobotType
-from skillframe.extend.outputs import Axes as Axes
-from skillframe.extend.outputs import Curve as Curve
-from skillframe.extend.outputs import Explanation as Explanation
-from skillframe.extend.outputs import ExporterType as ExporterType
-from skillframe.extend.outputs import FolderType as FolderType
-from skillframe.extend.outputs import Grid as Grid
-from skillframe.extend.outputs import Illustration as Illustration
-from skillframe.extend.outputs import Moment as Moment
-from skillframe.extend.outputs import MovingImpedance as MovingImpedance
-from skillframe.extend.outputs import OutputType as OutputType
-from skillframe.extend.outputs import ReportFiles as ReportFiles
-from skillframe.extend.outputs import RequirementType as RequirementType
-from skillframe.extend.outputs import RowResult as RowResult
-from skillframe.extend.outputs import RowRun as RowRun
-from skillframe.extend.outputs import RowType as RowType
-from skillframe.extend.outputs import ScoreType as ScoreType
-from skillframe.extend.outputs import SectionType as SectionType
-from skillframe.extend.outputs import Segmentation as Segmentation
-from skillframe.extend.outputs import Setting as Setting
-from skillframe.extend.outputs import TimePlot as TimePlot
-from skillframe.extend.outputs import Verdict as Verdict
-from skillframe.extend.outputs import actuator_curves as actuator_curves
-from skillframe.extend.outputs import no_progress as no_progress
-from skillframe.extend.outputs import part_problem as part_problem
+from skillframe.extend.outputs import Illustration
 
 if TYPE_CHECKING:
     from pathlib import Path

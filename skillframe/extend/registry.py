@@ -21,8 +21,10 @@ import pluggy
 from skillframe.errors import SkillframeError, UnknownName
 from skillframe.extend import hookspecs
 from skillframe.extend.contract import ATTRIBUTE, GROUP, contract_problem, requirement_problem
+from skillframe.extend.hardware import DriveType, RobotType
 from skillframe.extend.homes import homes, install_line, where_to_get
 from skillframe.extend.isolated import isolated
+from skillframe.extend.outputs import ExporterType, OutputType, RowType, ScoreType
 from skillframe.extend.plugin import KINDS as KINDS
 from skillframe.extend.plugin import RECORDS as RECORDS
 from skillframe.extend.plugin import BadPlugin as BadPlugin
@@ -32,19 +34,13 @@ from skillframe.extend.plugin import PluginConflict as PluginConflict
 from skillframe.extend.plugin import checked, hook_problems, installed
 from skillframe.extend.records import (
     CoordinatorType,
-    DriveType,
-    ExporterType,
-    OutputType,
     ReaderType,
-    RobotType,
-    RowType,
-    ScoreType,
     SegmenterType,
     SkillType,
     TeacherType,
     WorldFileType,
     WorldType,
-)  # fmt: skip
+)
 
 WORLD_FILE = ".toml"
 """Ending of a file that describes a world."""

@@ -1,1 +1,5 @@
 """FMUs: files, builds, instances and banks, in this or in child processes."""
+
+from lazy_loader import attach_stub
+
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -12,11 +12,12 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
-INPUTS = ("command", "position", "velocity", "acceleration")
+Float = NDArray[np.float64]  #: array of floats
+INPUTS = ("command", "position", "velocity", "acceleration")  #: inputs of an actuator
+#: outputs of an actuator
 OUTPUTS = ("force", "force_mean", "work", "pressure_a", "pressure_b", "flow_a", "flow_b", "spool")
 
-OK, WARNING, DISCARD, ERROR, FATAL, NOT_FINITE, ENDED, LOST = range(8)
+OK, WARNING, DISCARD, ERROR, FATAL, NOT_FINITE, ENDED, LOST = range(8)  #: statuses of a step
 STATUS_TEXT = (
     "fine", "a warning", "the step was refused", "an error", "a fatal error", "an output is not a finite number",
     "the FMU terminated the simulation", "its process was lost",

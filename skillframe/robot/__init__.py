@@ -1,10 +1,5 @@
-"""Robots described by a URDF and robot.toml.
+"""Robots described by a URDF and robot.toml."""
 
-Only `spec` is imported here, so that reading robot.toml needs no Pinocchio.
-"""
+from lazy_loader import attach_stub
 
-from skillframe.robot.interface import Control
-from skillframe.robot.spec import Limits, RobotSpec, Workspace, load_robot, robot_names
-from skillframe.robot.tables import Arm
-
-__all__ = ["Arm", "Control", "Limits", "RobotSpec", "Workspace", "load_robot", "robot_names"]
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from skillframe.frames import Float, cross
 
-LARGEST_FILE = 100_000_000  # bytes: two million triangles, read in seconds
+LARGEST_FILE = 100_000_000  #: bytes: two million triangles, read in seconds
 
 _UNIT = re.compile(rb"<unit[^>]*\bmeter=[\"']([^\"']+)")
 
@@ -153,7 +153,7 @@ def missing_collada() -> bool:
 
 
 ROUNDING = 1e-6  # of the mesh's size: a few roundings of STL's single precision
-SMALLEST = 2e-4  # m; a part of 0.2 m read a thousand times too small
+SMALLEST = 2e-4  #: m; a part of 0.2 m read a thousand times too small
 LARGEST = 10.0  # m; a part of 10 mm read a thousand times too large
 
 

@@ -24,14 +24,14 @@ from skillframe.robot.tables import LoopClosure
 from skillframe.world.scene import Geom, Holder, Mover, Scene, Sprung, Tool
 from skillframe.world.surfaces import number_of
 
-TIMESTEP = 0.001
+TIMESTEP = 0.001  #: of the contact simulation [s]
 SOLREF = (0.004, 1.0)  # 4 time steps, critically damped
 SOLIMP = (0.01, 0.95, 1e-4, 0.5, 1.0)  # impedance rises from almost zero at touch, against chatter
-FIXTURE, TOOL, SENSOR, SECOND = "fixture", "tool", "sensor", "second_sensor"
+FIXTURE, TOOL, SENSOR, SECOND = "fixture", "tool", "sensor", "second_sensor"  #: names of bodies and sensors
 BASE = "robot_base"  # fixed parts of the robot
-SPRUNG = "sprung_"  # prefix of sprung parts
+SPRUNG = "sprung_"  #: prefix of sprung parts
 MOUNT = SPRUNG + "mount_"  # prefix of the joints of a soft mount
-FASTEST_SWING = 1.2  # rad a time step, of the tool on a soft mount: semi-implicit Euler is stable to 2
+FASTEST_SWING = 1.2  #: rad a time step, of the tool on a soft mount: semi-implicit Euler is stable to 2
 STICTION_SOLREF, STICTION_SOLIMP = (0.004, 1.0), (0.99, 0.999, 1e-3, 0.5, 2.0)  # joint friction with little creep
 _KINDS = {
     "box": mujoco.mjtGeom.mjGEOM_BOX, "sphere": mujoco.mjtGeom.mjGEOM_SPHERE, "plane": mujoco.mjtGeom.mjGEOM_PLANE,

@@ -47,7 +47,7 @@ class Travels:
         return found
 
 
-Draws = Mapping[str, Float]
+Draws = Mapping[str, Float]  #: sampled values of each quantity, one for each trial
 START_DEPTH = 1e-4
 """Largest penetration at the start [m]; resting parts have 20 um."""
 _VELOCITY = int(mujoco.mjtStage.mjSTAGE_VEL)

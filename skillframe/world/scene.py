@@ -19,7 +19,7 @@ from skillframe.frames import Float, Pose
 from skillframe.robot.meshes import unfit_to_collide
 from skillframe.world.surfaces import Surface
 
-Vector = tuple[float, float, float]
+Vector = tuple[float, float, float]  #: x, y, z
 IDENTITY = (0.0, 0.0, 0.0, 1.0)
 KINDS = ("box", "capsule", "cylinder", "mesh", "plane", "sphere")
 REACTION_S = 0.2

@@ -15,7 +15,7 @@ from skillframe.world.scene import Geom, State, Tool, Way
 
 TOOL_COLOUR = (0.85, 0.45, 0.15, 1.0)
 """RGBA of tools."""
-FIXTURE_COLOUR = (0.55, 0.62, 0.70, 1.0)
+FIXTURE_COLOUR = (0.55, 0.62, 0.70, 1.0)  #: red, green, blue, opacity
 
 
 def quaternion_about(axis: str, angle: float) -> tuple[float, float, float, float]:
@@ -96,7 +96,7 @@ def shaft(radius: float, start: float, stop: float) -> Geom:
 
 TOOL_DOWN = (1.0, 0.0, 0.0, 0.0)
 """Orientation in the fixture frame of a tool that points down (tool z = fixture -z)."""
-WRIST_TO_TIP = 0.2
+WRIST_TO_TIP = 0.2  #: length of the tools of the test worlds [m]
 TOOL_MASS = 0.6
 FLOOR = 0.002
 """Clearance [m] outside a hole's floor or edge, more than contacts penetrate."""

@@ -201,7 +201,7 @@ def learning():
     from skillframe_teaching.teacher import TeacherSettings
 
     from skillframe.errors import UnknownName
-    from skillframe.extend.records import LearnOptions
+    from skillframe.extend import LearnOptions
     from skillframe.extend.registry import registry
 
     try:

@@ -85,7 +85,7 @@ def segment_seconds() -> tuple[float, float]:
 def step_seconds(count: int) -> float:
     """Filter and LMC of a running policy: CPU seconds per tick and trial, the ends of windows included."""
     from skillframe.document.file import learned
-    from skillframe.extend.records import LearnOptions
+    from skillframe.extend import LearnOptions
     from skillframe.extend.registry import registry
     from skillframe.frames import Pose
     from skillframe.skill import Observation

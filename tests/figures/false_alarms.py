@@ -20,8 +20,8 @@ from skillframe.api.learning import learn_with
 from skillframe.demonstration.contact import Contact
 from skillframe.demonstration.phases import several_phases
 from skillframe.errors import SkillframeError, SkillframeWarning
+from skillframe.extend import LearnOptions
 from skillframe.extend.reading import read_demonstration
-from skillframe.extend.records import LearnOptions
 from tests.figures.recorded import every_recording
 from tests.sound_slides import Slide, slide
 

@@ -206,7 +206,7 @@ def rows_of_papers(folder: Path) -> list[Case]:
     from skillframe_papers import store
     from skillframe_papers.jobs import jobs_of
 
-    from skillframe.extend.records import RowResult
+    from skillframe.extend import RowResult
     from skillframe.extend.registry import registry
 
     row = registry().names("row")[0]

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from skillframe.demonstration.record import Demonstration
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend import Document, LearnOptions
 from skillframe.extend.registry import registry
 
 MISSED_S, FALSE_S = 0.30, 0.35

@@ -16,8 +16,8 @@ from skillframe_recordings.audit import audit
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.document.file import learned
+from skillframe.extend import Document, LearnOptions
 from skillframe.extend.reading import read_demonstration
-from skillframe.extend.records import Document, LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import Float
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from skillframe.extend.records import LearnOptions
+from skillframe.extend import LearnOptions
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "plugins/lmc/tests"))
 

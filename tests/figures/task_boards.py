@@ -41,7 +41,7 @@ from skillframe.errors import SkillframeError
 from skillframe.execution.executor import simulate
 from skillframe.execution.prepare import load_robot_model, load_world, prepare
 from skillframe.execution.trace import Trace
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend import Document, LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, norm, rotate, rotate_spatial
 from skillframe.sequence import Moved, Part

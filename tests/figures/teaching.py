@@ -10,7 +10,7 @@ from skillframe_teaching.teacher import TeacherSettings
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.execution.prepare import load_robot_model, load_world
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend import Document, LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import Float
 from skillframe.world.quantities import SensorSettings

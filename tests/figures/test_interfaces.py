@@ -16,7 +16,7 @@ from skillframe.document.file import learned
 from skillframe.execution.drives.torque import TARED_IN_CONTACT
 from skillframe.execution.executor import Result, Setup, begin, simulate
 from skillframe.execution.prepare import load_robot_model, load_world, prepare
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend import Document, LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import Float, norm
 from skillframe.robot.interface import VIRTUAL_MASS, Control

@@ -21,7 +21,7 @@ from skillframe_teaching.teacher import TeacherSettings
 from skillframe.document.file import learned
 from skillframe.execution.executor import Result, simulate
 from skillframe.execution.prepare import load_robot_model, load_world, prepare
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend import Document, LearnOptions
 from skillframe.extend.registry import registry
 
 pytestmark = [pytest.mark.needs_plugins]

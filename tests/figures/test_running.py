@@ -9,7 +9,7 @@ from scipy.stats import binomtest
 from skillframe.document.file import learned
 from skillframe.execution.executor import Result, simulate
 from skillframe.execution.prepare import load_robot_model, load_world, prepare
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend import Document, LearnOptions
 from skillframe.extend.registry import registry
 from tests.figures.teaching import SEED, row, taught
 

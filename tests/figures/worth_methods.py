@@ -16,7 +16,7 @@ from skillframe_lmc.settings import Settings
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.document.file import learned as learned_as
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend import Document, LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import Float, norm, unit
 from tests.figures.teaching import learned

@@ -10,7 +10,7 @@ import numpy as np
 from skillframe_lmc.phase import Stop
 from skillframe_lmc.stall import StallWatch
 
-from skillframe.extend.records import Document
+from skillframe.extend import Document
 from skillframe.extend.registry import registry
 from skillframe.frames import Float, Pose, rotation_matrix, rotation_vector, unit
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons, rows_of

@@ -9,7 +9,7 @@ from skillframe_worlds.hooks import skillframe_worlds as world_types
 
 from skillframe.cosim import CosimSettings, Master, Motion
 from skillframe.execution.drives.actuated import CoupledPlant
-from skillframe.extend.records import make_scene
+from skillframe.extend import make_scene
 from skillframe.fmu.actuator import ActuatorSpec
 from skillframe.fmu.opening import open_actuators
 from skillframe.robot.chain import ClosedChain

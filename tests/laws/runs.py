@@ -7,7 +7,7 @@ import numpy as np
 from skillframe_worlds.hooks import skillframe_worlds as world_types
 
 from skillframe.execution.executor import Setup, simulate
-from skillframe.extend.records import make_scene
+from skillframe.extend import make_scene
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import Limits, load_robot
 from skillframe.world.quantities import SensorSettings

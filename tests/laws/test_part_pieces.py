@@ -8,7 +8,7 @@ import pytest
 from manifold3d import JoinType
 from skillframe_parts.record import world_of_file
 
-from skillframe.extend.records import make_scene
+from skillframe.extend import make_scene
 from skillframe.frames import matrix_from_quaternion, rotation_vector
 from tests import part_meshes
 from tests.laws.pushing import Hold, Push, impedance

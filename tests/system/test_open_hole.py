@@ -8,7 +8,7 @@ import pytest
 
 from skillframe import Campaign, learn, record
 from skillframe.errors import SkillframeWarning
-from skillframe.extend.records import make_scene
+from skillframe.extend import make_scene
 from skillframe.extend.registry import registry
 from tests.part_meshes import FILE, rod, round_pair, write
 

@@ -120,7 +120,20 @@ def imports_below(node, place, typed=False):
 
 def imports(path, at_run_time=True):
     """(line, module) of every import, of those for types only where it need not be at run time."""
-    return [(line, module) for line, module, typed in facts(path).imports if not (typed and at_run_time)]
+    found = [(line, module) for line, module, typed in facts(path).imports if not (typed and at_run_time)]
+    return [(line, exported().get(module, module)) for line, module in found]
+
+
+@cache
+def exported():
+    """Where each name that a package of the core exports is defined, by its dotted names."""
+    found = {}
+    for path in PACKAGE.glob("*/__init__.pyi"):
+        package = f"skillframe.{path.parent.name}"
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            home = ".".join([package, *([node.module] if node.module else [])])
+            found |= {f"{package}.{alias.name}": f"{home}.{alias.name}" for alias in node.names}
+    return found
 
 
 def own(module):

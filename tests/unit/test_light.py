@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from skillframe.extend import ExporterType, Lazy
 from skillframe.extend.homes import homes
-from skillframe.extend.records import ExporterType, Lazy
 from skillframe.extend.registry import KINDS, registry
 
 PLUGINS = sorted(p for p in (Path(__file__).resolve().parents[2] / "plugins").iterdir() if (p / "src").is_dir())

@@ -5,7 +5,7 @@ import importlib
 import inspect
 import re
 from functools import cache
-from itertools import pairwise
+from itertools import zip_longest
 from pathlib import Path
 
 import pytest
@@ -15,23 +15,8 @@ API = (ROOT / "docs" / "reference" / "api.md").read_text(encoding="utf-8")
 MODULES = re.findall(r"^\.\. automodule:: (\S+)\n((?:   :.*\n)*)", API, re.MULTILINE)
 PAGES = [*ROOT.glob("docs/how-to/*.md"), *ROOT.glob("docs/tutorial/*.md"), *ROOT.glob("docs/reference/*.md")]
 PAGES += [ROOT / "README.md", *ROOT.glob("plugins/*/README.md")]
-INSIDE = {
-    "skillframe_papers",
-    "skillframe_benchmarks",
-    "skillframe_certify",
-    "skillframe_drive",
-    "skillframe_gym",
-    "skillframe_hydraulics",
-    "skillframe_parts",
-    "skillframe_recordings",
-    "skillframe_reports",
-    "skillframe_teaching",
-    "skillframe_testkit",
-    "skillframe_ur",
-    "skillframe_worlds",
-}  # they run the core from inside, as the page says
 SOURCES = [
-    *(p for p in ROOT.glob("plugins/*/src/**/*.py") if not INSIDE & set(p.parts)),
+    *ROOT.glob("plugins/*/src/**/*.py"),
     *ROOT.glob("examples/*.py"),
     *ROOT.glob("plugins/testkit/src/skillframe_testkit/plugin_template/**/*.py"),
 ]
@@ -49,8 +34,7 @@ def public():
     found = {"skillframe": set(importlib.import_module("skillframe").__all__)}
     for module, options in MODULES:
         listed = option(options, "members")
-        names = listed or (all_of(importlib.import_module(module)) - option(options, "exclude-members"))
-        found.setdefault(module, set()).update(names)
+        found.setdefault(module, set()).update(listed or all_of(importlib.import_module(module)))
     return found
 
 
@@ -65,22 +49,26 @@ def all_of(module):
 
 @cache
 def constants(module):
-    """Names that a module assigns at its top with a docstring below."""
-    body = ast.parse(inspect.getsource(module)).body
+    """Names that a module assigns at its top with a docstring below, or with a comment `#:`."""
+    source = inspect.getsource(module)
+    lines, body = source.splitlines(), ast.parse(source).body
     found = set()
-    for node, following in pairwise(body):
-        if isinstance(following, ast.Expr) and isinstance(following.value, ast.Constant):
+    for node, following in zip_longest(body, body[1:]):
+        below = isinstance(following, ast.Expr) and isinstance(following.value, ast.Constant)
+        if below or "#:" in lines[node.lineno - 1] or lines[node.lineno - 2].startswith("#:"):
             targets = getattr(node, "targets", [getattr(node, "target", None)])
-            found |= {target.id for target in targets if isinstance(target, ast.Name)}
+            found |= {n.id for target in targets if target for n in ast.walk(target) if isinstance(n, ast.Name)}
     return found
 
 
 def homes(module, name):
     """The module, and where it has a name from."""
-    body = ast.parse(inspect.getsource(module)).body
-    froms = [n.module for n in body if isinstance(n, ast.ImportFrom) and name in {alias.name for alias in n.names}]
+    stub = Path(module.__file__).with_suffix(".pyi")
+    body = ast.parse(stub.read_text(encoding="utf-8") if stub.exists() else inspect.getsource(module)).body
+    froms = [n for n in body if isinstance(n, ast.ImportFrom) and name in {alias.name for alias in n.names}]
     listed = getattr(module, "_PUBLIC", {}).get(name)
-    return [module, *map(importlib.import_module, [*froms, *([listed] if listed else [])])]
+    places = [f"{module.__name__}." * n.level + (n.module or "") for n in froms] + [listed] * bool(listed)
+    return [module, *map(importlib.import_module, [place.rstrip(".") for place in places])]
 
 
 def imports(text):
@@ -123,7 +111,7 @@ def test_every_name_that_the_page_lists_exists_and_is_documented():
         home = importlib.import_module(module)
         for name in names - {"__version__"}:
             value = getattr(home, name)
-            routine = inspect.isroutine(value) or inspect.isclass(value)
+            routine = inspect.isroutine(value) or inspect.isclass(value) or inspect.ismodule(value)
             if not (inspect.getdoc(value) if routine else any(name in constants(m) for m in homes(home, name))):
                 lacking.append(f"{module}.{name}")
     assert not lacking

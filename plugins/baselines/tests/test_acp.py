@@ -11,7 +11,7 @@ from plugins.baselines.tests.demonstrations import GOAL, approach, both_sides
 from skillframe.demonstration.record import Demonstration
 from skillframe.document.file import learned
 from skillframe.errors import InputError
-from skillframe.extend.records import LearnOptions
+from skillframe.extend import LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import Pose, norm
 from skillframe.skill import Observation, Status

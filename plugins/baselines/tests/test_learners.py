@@ -14,7 +14,7 @@ from skillframe_testkit.suites import SkillConformance, play
 from plugins.baselines.tests.demonstrations import GOAL, UPSIDE, approach, both_sides
 from skillframe.document.file import learned
 from skillframe.errors import InputError, MissingDependency
-from skillframe.extend.records import LearnOptions
+from skillframe.extend import LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import Pose, norm, rotation_matrix, rotation_vector
 from skillframe.skill import Observation, Status

@@ -8,7 +8,7 @@ from skillframe_testkit.suites import SkillConformance, example_demonstrations, 
 from skillframe.demonstration.record import Demonstration
 from skillframe.document.file import learned
 from skillframe.errors import InputError
-from skillframe.extend.records import LearnOptions
+from skillframe.extend import LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import (
     Pose,

@@ -8,7 +8,7 @@ from skillframe_teaching.teacher import TeacherSettings
 from skillframe.document.file import learned
 from skillframe.execution.executor import simulate
 from skillframe.execution.prepare import load_robot_model, load_world, prepare
-from skillframe.extend.records import LearnOptions
+from skillframe.extend import LearnOptions
 from skillframe.extend.registry import registry
 
 TILT = np.deg2rad(8.0)  # of the world's first demonstration

@@ -19,7 +19,7 @@ from skillframe.errors import SkillframeError
 from skillframe.execution.drives.torque import HOLD
 from skillframe.execution.executor import simulate
 from skillframe.execution.prepare import load_robot_model, load_world, prepare
-from skillframe.extend.records import LinkType
+from skillframe.extend import LinkType
 from skillframe.extend.registry import registry
 from skillframe.frames import Pose, rotation_matrix
 from skillframe.skill import Command, Observation, Skill, no_reasons

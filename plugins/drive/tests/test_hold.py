@@ -35,7 +35,7 @@ from skillframe.campaign.folder import campaign_hash
 from skillframe.cli.main import run
 from skillframe.errors import InputError
 from skillframe.execution.trace import Trace
-from skillframe.extend.records import LinkType, ReportFiles, part_problem
+from skillframe.extend import LinkType, ReportFiles, part_problem
 from skillframe.extend.registry import registry
 from skillframe.frames import quaternion_from_matrix, rotation_matrix
 

@@ -22,7 +22,7 @@ from skillframe_drive.runs import load_task
 
 from skillframe.demonstration.convention import GRAVITY
 from skillframe.errors import SkillframeError
-from skillframe.extend.records import LinkType
+from skillframe.extend import LinkType
 from skillframe.extend.registry import registry
 from skillframe.frames import rotation_matrix
 from skillframe.robot.interface import LOOP_DAMPING, Control

@@ -14,7 +14,7 @@ from skillframe.document.file import load, new_document, save
 from skillframe.errors import InputError, UnknownName
 from skillframe.execution.executor import simulate
 from skillframe.execution.prepare import load_robot_model, prepare
-from skillframe.extend.records import LearnOptions
+from skillframe.extend import LearnOptions
 from skillframe.extend.registry import registry
 
 pytestmark = pytest.mark.needs_plugins

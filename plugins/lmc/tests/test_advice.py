@@ -10,7 +10,7 @@ from skillframe_lmc.learner import learn
 from skillframe_testkit.checks.examples import example_demonstrations
 
 from skillframe.document.file import learned
-from skillframe.extend.records import LearnOptions
+from skillframe.extend import LearnOptions
 from skillframe.extend.registry import registry
 
 pytestmark = pytest.mark.needs_plugins

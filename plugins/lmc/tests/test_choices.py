@@ -11,7 +11,7 @@ from skillframe_lmc.intervals import Motion
 from skillframe_lmc.learner import learn
 from skillframe_lmc.sectors import Sectors, sectors
 
-from skillframe.extend.records import LearnOptions
+from skillframe.extend import LearnOptions
 from skillframe.frames import Float
 
 DOWN = np.array([0.0, 0.0, -1.0])

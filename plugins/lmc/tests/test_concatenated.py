@@ -10,7 +10,7 @@ import synthetic as syn
 from skillframe_lmc.learner import learn
 
 from skillframe.demonstration.record import Demonstration
-from skillframe.extend.records import LearnOptions
+from skillframe.extend import LearnOptions
 
 SLOPE, MU = 40.0, 0.2
 GRID = 1.5  # degrees: finest cells of the search

@@ -10,8 +10,8 @@ from skillframe_lmc.advice import GOOD, LIMP, OTHER_SIDE, STILL, advice
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.document.file import learned
+from skillframe.extend import LearnOptions
 from skillframe.extend.reading import read_demonstration
-from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
 from tests.sound_slides import eased, slide, slow_noise
 

@@ -10,7 +10,7 @@ from skillframe_lmc.learner import learn
 from skillframe_lmc.settings import Settings
 
 from skillframe.demonstration.record import Demonstration
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend import Document, LearnOptions
 
 ORIGIN = np.zeros(3)
 

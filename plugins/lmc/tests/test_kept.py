@@ -12,7 +12,7 @@ from skillframe_lmc.learner import learn
 from skillframe_lmc.phase import read_phase
 
 from skillframe.errors import InputError
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend import Document, LearnOptions
 
 
 @cache

@@ -12,7 +12,7 @@ from skillframe_lmc.learner import learn
 from test_posterior import legs
 
 from skillframe.demonstration.record import Demonstration
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend import Document, LearnOptions
 from skillframe.frames import Float, rotation_matrix
 
 GRID = 1.5  # degrees: the finest cells of the search are 1.6 wide, the last step inside a disc removes most of that

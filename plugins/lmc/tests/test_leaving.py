@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.document.file import learned
-from skillframe.extend.records import LearnOptions
+from skillframe.extend import LearnOptions
 from skillframe.extend.registry import registry
 from tests.sound_slides import eased
 

@@ -22,8 +22,8 @@ from synthetic import valley
 from skillframe.cli.main import run
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
+from skillframe.extend import Document, LearnOptions
 from skillframe.extend.reading import write_demonstration
-from skillframe.extend.records import Document, LearnOptions
 from skillframe.frames import Float, cross, unit
 
 RATE, SPEED = 200.0, 0.08

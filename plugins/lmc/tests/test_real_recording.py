@@ -9,8 +9,8 @@ from skillframe_lmc.explain import explain
 from skillframe_lmc.learner import learn
 
 from skillframe.demonstration.record import Demonstration
+from skillframe.extend import Document, LearnOptions
 from skillframe.extend.reading import read_demonstration
-from skillframe.extend.records import Document, LearnOptions
 from tests.references import recordings_dir
 
 PHASES = {"approach": (0.0, 7.07), "alignment": (7.08, 15.38), "insertion": (15.385, 16.32), "mating": (16.33, 18.5)}

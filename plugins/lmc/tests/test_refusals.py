@@ -8,7 +8,7 @@ import synthetic as syn
 from skillframe_lmc.learner import learn
 
 from skillframe.errors import InputError, UnknownName
-from skillframe.extend.records import LearnOptions
+from skillframe.extend import LearnOptions
 
 
 def test_demonstrations_of_different_tools_are_refused() -> None:

@@ -15,7 +15,7 @@ from skillframe_lmc.runtime import build
 
 from skillframe.errors import InputError
 from skillframe.execution.prepare import load_robot_model, load_world, prepare
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend import Document, LearnOptions
 from skillframe.frames import Float, Pose, norm, rotation_matrix, rotation_vector, unit
 from skillframe.skill import Command, Observation, Skill, Status
 

@@ -13,7 +13,7 @@ from skillframe_lmc.words import axis_words, direction_words, listed
 from skillframe_testkit.suites import SkillConformance
 
 from skillframe.document.file import learned
-from skillframe.extend.records import Document, Illustration, LearnOptions, SkillType
+from skillframe.extend import Document, Illustration, LearnOptions, SkillType
 from skillframe.extend.registry import registry
 from skillframe.frames import norm, unit
 

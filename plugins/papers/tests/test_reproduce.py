@@ -20,7 +20,7 @@ from skillframe_papers.runner import Outcome
 
 from skillframe.cli.main import run
 from skillframe.cli.output import PAGE_WIDTH
-from skillframe.extend.records import Illustration, RowResult, RowType
+from skillframe.extend import Illustration, RowResult, RowType
 from skillframe.extend.registry import Plugin, Registry, registry
 
 PLUGIN = """

@@ -29,7 +29,7 @@ from skillframe_papers.rows.uneven_demonstrations import Valley, valley_scene
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.execution.prepare import load_robot_model
-from skillframe.extend.records import RowRun
+from skillframe.extend import RowRun
 from skillframe.frames import Pose
 from skillframe.world.scene import State
 

@@ -10,7 +10,7 @@ from skillframe_papers.rows.blocks import Blocks
 from skillframe_papers.rows.insertion import Row, at_start, in_the_grasp
 from skillframe_papers.rows.sweep import both
 
-from skillframe.extend.records import RowRun
+from skillframe.extend import RowRun
 from skillframe.frames import Pose
 from skillframe.skill import Command, Impedance, Observation, Skill, no_reasons
 from skillframe.world.plant import grasp_pose

@@ -8,7 +8,7 @@ from skillframe_papers.rows.harness import Ran, stiff
 from skillframe_papers.rows.skills import by_hand
 
 from skillframe.execution.prepare import load_robot_model, load_world
-from skillframe.extend.records import RowRun
+from skillframe.extend import RowRun
 from skillframe.frames import rotate, rotation_matrix
 
 LIMIT = np.radians(45.0) - np.arctan(0.2)

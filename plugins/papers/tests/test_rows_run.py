@@ -6,7 +6,7 @@ from skillframe_papers.rows import exceptions, screws, skills, whole_tasks
 from skillframe_papers.rows.harness import Ran
 
 from skillframe.execution.prepare import load_world
-from skillframe.extend.records import RowRun
+from skillframe.extend import RowRun
 
 
 def ran(hits, count=24):

@@ -8,7 +8,7 @@ from skillframe_parts.solid import read_part
 
 from plugins.parts.tests.test_second import after, plant_of
 from skillframe.errors import InputError
-from skillframe.extend.records import make_scene
+from skillframe.extend import make_scene
 from skillframe.extend.registry import registry
 from tests.part_meshes import box, export
 

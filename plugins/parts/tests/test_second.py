@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from skillframe.errors import InputError
-from skillframe.extend.records import make_scene
+from skillframe.extend import make_scene
 from skillframe.extend.registry import registry
 from skillframe.frames import Pose
 from skillframe.robot.model import load_model

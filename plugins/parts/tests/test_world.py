@@ -10,7 +10,7 @@ from skillframe_parts.world import GRIPPER
 from skillframe_testkit.checks import check_world
 
 from skillframe.errors import InputError
-from skillframe.extend.records import make_scene
+from skillframe.extend import make_scene
 from skillframe.extend.registry import registry
 from skillframe.frames import Pose, matrix_from_quaternion, norm, rotation_matrix
 from skillframe.world.scene import State

@@ -4,8 +4,8 @@ import pytest
 from skillframe_reports.page import Page, render, sections_of
 from skillframe_reports.sources import read_chapters
 
+from skillframe.extend import Moment, SectionType, no_progress
 from skillframe.extend.homes import homes
-from skillframe.extend.records import Moment, SectionType, no_progress
 from skillframe.extend.registry import Plugin, load_registry, registry
 from tests.report_fakes import campaign, trace
 

@@ -12,7 +12,7 @@ from skillframe_reports.sources import read_chapters
 
 from skillframe.cli.main import run
 from skillframe.errors import InputError
-from skillframe.extend.records import Illustration, SkillType
+from skillframe.extend import Illustration, SkillType
 from tests.report_fakes import campaign, skill_document, trace
 
 EVIL = "<script>alert('x')</script>\"'><img src=x onerror=alert(1)>"

@@ -12,7 +12,7 @@ from skillframe_reports.sources import read_chapters
 
 from skillframe.cli.main import run
 from skillframe.errors import UnknownName
-from skillframe.extend.records import Grid, Illustration, ReportFiles, SectionType
+from skillframe.extend import Grid, Illustration, ReportFiles, SectionType
 from skillframe.extend.registry import Plugin, load_registry
 from tests.report_fakes import campaign, trace
 

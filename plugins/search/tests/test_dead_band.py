@@ -11,7 +11,7 @@ from skillframe_search.simple import FINER, there_and_back
 from test_search_in_contact import given, run
 
 from skillframe.document.file import learned
-from skillframe.extend.records import LearnOptions
+from skillframe.extend import LearnOptions
 from skillframe.extend.registry import registry
 
 FRICTION, PUSH, STIFFNESS, SPEED, PITCH = 0.5, 10.0, 2000.0, 0.012, 0.0008

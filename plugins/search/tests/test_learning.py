@@ -14,7 +14,7 @@ from skillframe_search.plan import area, exerted, keyed, plan
 from skillframe.demonstration.record import Demonstration
 from skillframe.document.file import learned
 from skillframe.errors import InputError, UnknownName
-from skillframe.extend.records import LearnOptions
+from skillframe.extend import LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import matrix_from_quaternion, norm, quaternion_from_matrix, rotation_matrix
 

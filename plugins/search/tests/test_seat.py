@@ -20,7 +20,7 @@ from skillframe.cli.main import run as typed
 from skillframe.demonstration.npz import write_npz
 from skillframe.document.file import checked, learned, load
 from skillframe.errors import InputError
-from skillframe.extend.records import LearnOptions, SkillType
+from skillframe.extend import LearnOptions, SkillType
 from skillframe.extend.registry import registry
 from skillframe.frames import Pose, norm, rotation_matrix
 from skillframe.skill import Observation, Skill, Status

@@ -14,7 +14,7 @@ from skillframe_search.straight import straight_push
 
 from skillframe.document.file import learned
 from skillframe.errors import InputError
-from skillframe.extend.records import LearnOptions
+from skillframe.extend import LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import quaternion_from_matrix, rotation_matrix
 from skillframe.skill import Impedance

@@ -8,7 +8,7 @@ from skillframe_segmenter.air import learned_in_air
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.document.file import learned
-from skillframe.extend.records import LearnOptions
+from skillframe.extend import LearnOptions
 from skillframe.extend.registry import registry
 
 RATE, SPEED = 200.0, 0.02

@@ -14,8 +14,8 @@ from skillframe_segmenter.segmentation import refitted
 
 from skillframe.cli import main
 from skillframe.errors import InputError, SkillframeError
+from skillframe.extend import LearnOptions
 from skillframe.extend.reading import write_demonstration
-from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
 from tests.figures import quasistatic as made
 

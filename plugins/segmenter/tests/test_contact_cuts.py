@@ -9,7 +9,7 @@ from skillframe_segmenter.explained import near_cuts
 from skillframe_segmenter.learning import learn
 
 from skillframe.demonstration.record import Demonstration
-from skillframe.extend.records import LearnOptions
+from skillframe.extend import LearnOptions
 from tests.sound_slides import slow_noise
 
 

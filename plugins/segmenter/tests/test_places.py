@@ -18,7 +18,7 @@ from skillframe.document.frame import as_plain, places_of
 from skillframe.errors import InputError, UnknownName
 from skillframe.execution.executor import simulate
 from skillframe.execution.prepare import load_robot_model, load_world, prepare
-from skillframe.extend.records import LearnOptions
+from skillframe.extend import LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import Pose, quaternion_from_matrix, rotate, rotate_spatial, rotation_matrix
 from skillframe.sequence import Moved

@@ -9,7 +9,7 @@ from skillframe_segmenter.learning import _alike, as_phase, pieces
 
 from skillframe.cli import main
 from skillframe.document.file import learned
-from skillframe.extend.records import LearnOptions
+from skillframe.extend import LearnOptions
 from skillframe.extend.registry import registry
 from skillframe.frames import Pose, matrix_from_quaternion
 from skillframe.skill import Observation, Status

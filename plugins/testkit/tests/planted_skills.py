@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from skillframe_testkit.suites import HoldSkill
 
-from skillframe.extend.records import SkillType
+from skillframe.extend import SkillType
 from skillframe.frames import Pose, rotation_matrix
 from skillframe.skill import Impedance, Skill
 

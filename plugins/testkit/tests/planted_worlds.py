@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from skillframe.extend.records import WorldType
+from skillframe.extend import WorldType
 from skillframe.frames import norm
 from skillframe.world.scene import Geom, Scene, Task, Tool
 

@@ -5,7 +5,7 @@ import pytest
 from skillframe_testkit.checks import check_skill
 from skillframe_testkit.checks.skills import example_document, rows_are_independent
 
-from skillframe.extend.records import CoordinatorType
+from skillframe.extend import CoordinatorType
 from skillframe.frames import Pose
 from skillframe.skill import Command, Impedance, Skill, no_reasons
 

@@ -10,7 +10,7 @@ from skillframe_testkit.suites import ReaderConformance, WorldConformance, examp
 
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
-from skillframe.extend.records import ReaderType, SegmenterType, WorldType
+from skillframe.extend import ReaderType, SegmenterType, WorldType
 from skillframe.extend.registry import load_registry
 
 CORE = load_registry()

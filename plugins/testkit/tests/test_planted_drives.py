@@ -5,7 +5,7 @@ import pytest
 from skillframe_testkit.checks import check_drive
 
 from skillframe.execution.drives.torque import OneArm, TorqueDrive
-from skillframe.extend.records import DriveType, Lazy
+from skillframe.extend import DriveType, Lazy
 
 
 @pytest.mark.parametrize(

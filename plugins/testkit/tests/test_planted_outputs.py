@@ -13,7 +13,7 @@ from skillframe_testkit.checks import check_exporter, check_robot, check_score, 
 
 from skillframe.errors import InputError
 from skillframe.execution.trace import Trace
-from skillframe.extend.records import (
+from skillframe.extend import (
     ExporterType,
     Grid,
     Illustration,

@@ -8,7 +8,7 @@ from skillframe_testkit.template import plugin_name
 
 from skillframe.cli.main import run
 from skillframe.errors import InputError
-from skillframe.extend.records import SkillType
+from skillframe.extend import SkillType
 from skillframe.extend.registry import Plugin, Registry, registry
 
 BROKEN = """

@@ -8,7 +8,7 @@ from skillframe_testkit.checks.skills import CHECKS
 from skillframe_testkit.suites import HoldSkill, SkillConformance
 
 from skillframe.errors import InputError
-from skillframe.extend.records import Illustration, SkillType
+from skillframe.extend import Illustration, SkillType
 from skillframe.frames import Pose
 from skillframe.skill import Impedance
 

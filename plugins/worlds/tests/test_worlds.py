@@ -8,7 +8,7 @@ from skillframe_worlds.hooks import skillframe_worlds as world_types
 
 from skillframe.errors import InputError
 from skillframe.execution.recorder import drawn_bodies
-from skillframe.extend.records import make_scene
+from skillframe.extend import make_scene
 from skillframe.frames import norm
 from skillframe.world.placement import fixture_poses
 from skillframe.world.plant import Plant

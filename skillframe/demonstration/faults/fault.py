@@ -11,7 +11,7 @@ from skillframe.errors import InputError
 
 KEY = "faults"
 """Metadata key of faults found when the recording was first read: [{kind, what, start, stop, value}]."""
-STEP, COPY, SATURATED, JUMP = "step", "copy", "saturation", "jump"
+STEP, COPY, SATURATED, JUMP = "step", "copy", "saturation", "jump"  #: kinds of a fault
 KINDS = (STEP, COPY, SATURATED, JUMP)
 TOUCHES = {
     STEP: "what follows may have another bias; a hard touch between two samples can do the same, so all of it counts",
@@ -110,9 +110,9 @@ def moved(meta: Mapping[str, Any], seconds: float, source: str = "") -> dict[str
         f._replace(start=f.start + seconds, stop=f.stop + seconds, value=f.value + seconds * (f.kind == COPY))
         for f in kept(meta, source)
     ]
-    return {**meta, KEY: as_meta(found)} if found else dict(meta)
+    return {**meta, KEY: flaws_as_meta(found)} if found else dict(meta)
 
 
-def as_meta(found: Sequence[Flaw]) -> list[dict[str, Any]]:
+def flaws_as_meta(found: Sequence[Flaw]) -> list[dict[str, Any]]:
     """Plain values for metadata and `--json`."""
     return [fault._asdict() for fault in found]

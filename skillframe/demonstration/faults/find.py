@@ -71,7 +71,7 @@ def with_named(meta: Mapping[str, Any], held: Sequence[Stall], found: Sequence[F
     """Metadata that name exactly these stalls and faults."""
     return {
         **{name: value for name, value in meta.items() if name not in (STALLS, record.KEY)},
-        **({STALLS: as_meta(held)} if held else {}), **({record.KEY: record.as_meta(found)} if found else {}),
+        **({STALLS: as_meta(held)} if held else {}), **({record.KEY: record.flaws_as_meta(found)} if found else {}),
     }  # fmt: skip
 
 

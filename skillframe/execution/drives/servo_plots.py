@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from skillframe.execution.trace import Trace
-from skillframe.extend.records import TimePlot, actuator_curves
+from skillframe.extend.outputs import TimePlot, actuator_curves
 
 TORQUE_CAPTION = "What the servos' springs put on the joints, in simulation."
 MOTOR_CAPTION = "Speeds of the motors, on the joints' side of their gears."

@@ -30,7 +30,7 @@ from skillframe.world.placement import fixture_poses, start_configurations
 from skillframe.world.plant import Draws, Kinematics, Plant
 from skillframe.world.sensors import TARE_TICKS, JointEncoders, Sensors
 
-HOLD = Impedance(np.diag([2000.0] * 3 + [100.0] * 3))
+HOLD = Impedance(np.diag([2000.0] * 3 + [100.0] * 3))  #: stiffness while a skill does not run [N/m, Nm/rad]
 TARED_IN_CONTACT = 0.5
 """Mean true contact force [N] during taring that is reported: the admittance controller's contact threshold.
 

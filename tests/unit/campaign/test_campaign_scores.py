@@ -17,7 +17,7 @@ from skillframe.extend.reading import write_demonstration
 PLUGIN = """
 import numpy as np
 from skillframe import hookimpl
-from skillframe.extend.records import ScoreType, SkillType
+from skillframe.extend import ScoreType, SkillType
 from skillframe.skill import Command
 from skillframe_testkit.suites import HoldSkill
 

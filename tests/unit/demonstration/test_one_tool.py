@@ -11,8 +11,8 @@ from skillframe_testkit.checks.examples import example_demonstrations
 
 from skillframe.cli.main import run
 from skillframe.errors import InputError
+from skillframe.extend import LearnOptions
 from skillframe.extend.reading import write_demonstration
-from skillframe.extend.records import LearnOptions
 from skillframe.extend.registry import registry
 
 pytestmark = pytest.mark.needs_plugins

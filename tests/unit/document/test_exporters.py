@@ -7,8 +7,8 @@ import pytest
 
 from skillframe.document.export import exported
 from skillframe.errors import InputError
+from skillframe.extend import MovingImpedance
 from skillframe.extend.builtin import skillframe_exporters
-from skillframe.extend.records import MovingImpedance
 from skillframe.extend.registry import BadPlugin
 
 PHASE = MovingImpedance(

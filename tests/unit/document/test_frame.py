@@ -11,7 +11,7 @@ from skillframe_testkit.checks.examples import example_demonstrations
 from skillframe.demonstration.record import Demonstration
 from skillframe.document.frame import frame_at, frame_of, read_frame, with_center
 from skillframe.errors import InputError, UnknownName
-from skillframe.extend.records import LearnOptions
+from skillframe.extend import LearnOptions
 from skillframe.extend.registry import registry
 
 ORIGIN = [0.0, 0.0, 0.0]

@@ -13,7 +13,7 @@ from skillframe_testkit.suites import HoldSkill
 from skillframe import __version__
 from skillframe.document import file as skillfile
 from skillframe.errors import InputError, UnknownName
-from skillframe.extend.records import Document, SkillType
+from skillframe.extend import Document, SkillType
 from skillframe.extend.registry import Plugin, load_registry
 
 FRAME = {"work_at": [0.0, 0.0, -0.2], "learned_at": [0.0, 0.0, 0.0], "center_of_compliance": [0.0, 0.0, 0.0]}

@@ -3,8 +3,8 @@ from skillframe_testkit.suites import HoldSkill, example_demonstrations
 
 from skillframe.document.file import SkillSource, learned, load_skill, parse_source, save
 from skillframe.errors import InputError, UnknownName
+from skillframe.extend import LearnOptions, SkillType
 from skillframe.extend.reading import write_demonstration
-from skillframe.extend.records import LearnOptions, SkillType
 
 
 @pytest.fixture

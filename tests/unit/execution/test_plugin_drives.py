@@ -18,7 +18,7 @@ from skillframe.robot.spec import robot_folder
 
 CODE = """
 from skillframe import hookimpl
-from skillframe.extend.records import DriveType
+from skillframe.extend import DriveType
 
 skillframe_contract = "0.2"
 

@@ -9,7 +9,7 @@ from skillframe.extend.registry import load_registry
 
 CODE = """
 from skillframe import hookimpl
-from skillframe.extend.records import SkillType
+from skillframe.extend import SkillType
 {top}
 @hookimpl
 def skillframe_skills():

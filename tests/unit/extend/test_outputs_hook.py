@@ -15,7 +15,7 @@ from tests.report_fakes import trace
 OWN = """
     from skillframe import hookimpl
     from skillframe.errors import InputError
-    from skillframe.extend.records import OutputType, RequirementType
+    from skillframe.extend import OutputType, RequirementType
 
     def refuse(path):
         if path.suffix != ".csv":

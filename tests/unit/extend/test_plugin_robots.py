@@ -14,7 +14,7 @@ from skillframe.robot.spec import robot_folder
 CODE = """
 from pathlib import Path
 from skillframe import hookimpl
-from skillframe.extend.records import RobotType
+from skillframe.extend import RobotType
 @hookimpl
 def skillframe_robots():
     yield RobotType(name="{name}", summary="a robot", folder=Path({folder!r}))

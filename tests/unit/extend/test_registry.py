@@ -15,7 +15,7 @@ from tests.unit.demonstration.conftest import make
 
 GOOD = """
 from skillframe import hookimpl
-from skillframe.extend.records import SkillType, WorldType
+from skillframe.extend import SkillType, WorldType
 
 @hookimpl
 def skillframe_skills():
@@ -53,7 +53,7 @@ BROKEN = {
         "skillframe_skills yielded 'slide', not a SkillType",
     ),
     "yields a record of another kind": (
-        "from skillframe.extend.records import ReaderType\n"
+        "from skillframe.extend import ReaderType\n"
         + HOOK
         + "yield ReaderType(name='x', summary='', suffixes=('.x',), read=print)",
         "not a SkillType",
@@ -63,7 +63,7 @@ BROKEN = {
         "gave None instead of yielding SkillType",
     ),
     "forgets a field": (
-        "from skillframe.extend.records import SkillType\n" + HOOK + "yield SkillType(name='x')",
+        "from skillframe.extend import SkillType\n" + HOOK + "yield SkillType(name='x')",
         "missing 2 required keyword-only arguments",
     ),
     "has a nameless record": (GOOD.format(name=""), "with the name ''"),
@@ -259,7 +259,7 @@ def test_a_plugin_installed_with_pip_is_found_and_leaves_when_uninstalled(tmp_pa
 
 AUDIT = """
 from skillframe import hookimpl
-from skillframe.extend.records import AuditType
+from skillframe.extend import AuditType
 
 @hookimpl
 def skillframe_audits():

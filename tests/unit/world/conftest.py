@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from skillframe_worlds.hooks import skillframe_worlds as world_types
 
-from skillframe.extend.records import make_scene
+from skillframe.extend import make_scene
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot
 from skillframe.world.placement import fixture_poses, start_configurations

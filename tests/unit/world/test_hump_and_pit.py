@@ -9,7 +9,7 @@ import pytest
 from skillframe_worlds.hooks import skillframe_worlds as world_types
 
 from skillframe.errors import InputError
-from skillframe.extend.records import make_scene
+from skillframe.extend import make_scene
 from skillframe.frames import Pose, rotation_matrix
 from skillframe.world.scene import State
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import Demonstration
 from skillframe.errors import InputError
 from skillframe.frames import (
     Float,

@@ -18,10 +18,10 @@ from typing import Any, Literal, TypeVar
 import numpy as np
 
 from skillframe.config import build
-from skillframe.demonstration.record import Demonstration
-from skillframe.document.frame import frame_of, read_frame
+from skillframe.demonstration import Demonstration
+from skillframe.document import frame_of, read_frame
 from skillframe.errors import InputError
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend import Document, LearnOptions
 from skillframe.frames import Float, Pose, continuous, norm, rotation_matrix, rotation_vector
 
 RATE = 100.0  # Hz

@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import Demonstration
 from skillframe.errors import InputError, MissingDependency
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend import Document, LearnOptions
 from skillframe.frames import Float, Pose, move_wrench, norm, rotation_matrix, rotation_vector
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 from skillframe_baselines import align
@@ -230,9 +230,8 @@ def describe(document: Document) -> list[str]:
 def example() -> Document:
     """A two-second primitive without forcing, to 50 mm below the example demonstration's start."""
 
-    from skillframe.document.file import new_document
-    from skillframe.document.frame import frame_of
-    from skillframe.extend.registry import registry
+    from skillframe.document import frame_of, new_document
+    from skillframe.extend import registry
 
     demonstrations, count = [example_demonstration()], 3
     goal = Pose(demonstrations[0].position[-1], demonstrations[0].pose.rotation[-1])

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import Demonstration
 from skillframe.errors import InputError
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend import Document, LearnOptions
 from skillframe.frames import Float, quaternion_from_matrix
 from skillframe.skill import Skill
 from skillframe_baselines import align, gmm

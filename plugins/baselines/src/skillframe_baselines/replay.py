@@ -20,10 +20,10 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from skillframe.config import build as configured
-from skillframe.demonstration.record import Demonstration
-from skillframe.document.frame import frame_of, read_frame
+from skillframe.demonstration import Demonstration
+from skillframe.document import frame_of, read_frame
 from skillframe.errors import InputError
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend import Document, LearnOptions
 from skillframe.frames import (
     Float,
     Pose,
@@ -256,7 +256,7 @@ def describe(document: Document) -> list[str]:
 def example() -> Document:
     """A replay of the example demonstration."""
 
-    from skillframe.document.file import learned
-    from skillframe.extend.registry import registry
+    from skillframe.document import learned
+    from skillframe.extend import registry
 
     return learned(registry().skill("replay"), [example_demonstration()])

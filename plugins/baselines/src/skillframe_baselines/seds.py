@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import Demonstration
 from skillframe.errors import InputError, MissingDependency
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend import Document, LearnOptions
 from skillframe.frames import Float, Pose, move_twist, norm, rotation_matrix, rotation_vector
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 from skillframe_baselines import align

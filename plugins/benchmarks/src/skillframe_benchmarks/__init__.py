@@ -4,7 +4,7 @@
 `counts`, `page`. `skillframe practise`: `practice`. `skillframe --help` imports this module only.
 """
 
-from skillframe.extend.commands import LazyCommand
+from skillframe.extend import LazyCommand
 
 benchmark = LazyCommand("Public benchmarks, on your copy of their parts.", "skillframe_benchmarks.command:command")
 practise = LazyCommand("Teach a skill from two meshes alone.", "skillframe_benchmarks.practice_command:command")

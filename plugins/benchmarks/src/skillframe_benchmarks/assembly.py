@@ -23,14 +23,12 @@ from skillframe_teaching import sessions
 from skillframe_teaching.teacher import TeacherSettings
 
 from skillframe import Campaign, CampaignResults, LearnedSkill, Recording, record
-from skillframe.api.inputs import demonstrations_of, robot_of, scene_of
-from skillframe.campaign import evaluate
-from skillframe.campaign.folder import load as load_campaign
-from skillframe.campaign.runner import Options, run_campaign
-from skillframe.demonstration.record import Demonstration
+from skillframe.api import demonstrations_of, robot_of, scene_of
+from skillframe.campaign import Options, evaluate, run_campaign
+from skillframe.campaign import load as load_campaign
+from skillframe.demonstration import Demonstration
 from skillframe.errors import SkillframeError, SkillframeWarning
-from skillframe.extend.records import make_scene, no_progress
-from skillframe.extend.registry import registry
+from skillframe.extend import make_scene, no_progress, registry
 from skillframe.files import write_whole
 from skillframe_benchmarks.assets import Pair
 from skillframe_benchmarks.methods import METHODS

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from skillframe.cli.options import COUNT, SEED
-from skillframe.cli.output import note, terminable
+from skillframe.cli import COUNT, SEED, note, terminable
 from skillframe.errors import InputError, UnknownName
 
 if TYPE_CHECKING:
@@ -142,7 +141,7 @@ def agree(out: Path, plan: Plan | Practice) -> None:
 
 
 def _list(found: Sequence[Any], as_json: bool) -> int:
-    from skillframe.cli.output import LIST_WIDTH, emit_json, table
+    from skillframe.cli import LIST_WIDTH, emit_json, table
     from skillframe_benchmarks.assets import DEVELOPED
 
     rows = [(pair.name, pair.way_out, pair.name in DEVELOPED) for pair in found]
@@ -172,7 +171,7 @@ def _run(jobs: Sequence[Any], out: Path, workers: int, as_json: bool, code: Any)
 
 
 def _show(jobs: Sequence[Any], out: Path, as_json: bool) -> None:
-    from skillframe.cli.output import PAGE_WIDTH, emit_json, table
+    from skillframe.cli import PAGE_WIDTH, emit_json, table
     from skillframe.files import write_whole
     from skillframe_benchmarks import page
     from skillframe_benchmarks.assembly import LEVELS

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from skillframe.campaign.rows import is_trial
+from skillframe.campaign import is_trial
 from skillframe_benchmarks.assembly import DONE, REFUSED, TRIALS, UNLEARNED, Level, by_level
 from skillframe_benchmarks.scores import passes
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from skillframe import hookimpl
-from skillframe.extend.records import Lazy, ScoreType
+from skillframe.extend import Lazy, ScoreType
 
 skillframe_contract = "0.2"
 INSERTION = (

@@ -16,7 +16,7 @@ import numpy as np
 from skillframe.frames import Float, matrix_from_quaternion, norm
 
 if TYPE_CHECKING:
-    from skillframe.execution.trace import Trace
+    from skillframe.execution import Trace
 
 WINDOW, ORDER = 15, 2
 """Samples and degree of the local polynomial of the velocity."""

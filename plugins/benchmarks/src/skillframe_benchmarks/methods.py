@@ -12,7 +12,7 @@ import numpy as np
 from skillframe_search.straight import straight_push
 
 from skillframe import LearnedSkill, learn
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import Demonstration
 
 Method = Callable[[Sequence[Demonstration]], LearnedSkill]
 

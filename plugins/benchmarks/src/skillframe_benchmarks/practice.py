@@ -22,10 +22,9 @@ from skillframe_parts.found import needs_units, new_text
 from skillframe_parts.load import LoadedParts, load
 
 from skillframe import Campaign, CampaignResults, LearnedSkill, learn, record
-from skillframe.api.inputs import demonstrations_of, scene_of
-from skillframe.campaign import evaluate
-from skillframe.campaign.runner import Options, Progress, run_campaign
-from skillframe.demonstration.record import Demonstration
+from skillframe.api import demonstrations_of, scene_of
+from skillframe.campaign import Options, Progress, evaluate, run_campaign
+from skillframe.demonstration import Demonstration
 from skillframe.errors import InputError, SkillframeWarning
 from skillframe.files import write_whole
 

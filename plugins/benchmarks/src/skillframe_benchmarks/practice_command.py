@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from skillframe.cli.options import COUNT, SEED, WithUnit
-from skillframe.cli.output import campaign_progress, emit_json, note, terminable
+from skillframe.cli import COUNT, SEED, WithUnit, campaign_progress, emit_json, note, terminable
 from skillframe.config.units import Range
 from skillframe.errors import InputError
 

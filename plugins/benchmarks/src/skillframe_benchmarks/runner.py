@@ -10,10 +10,7 @@ from contextlib import closing, redirect_stdout
 from pathlib import Path
 from typing import Any
 
-from skillframe.campaign.cluster import ClusterPool
-from skillframe.campaign.driver import WHY, Died, Raised
-from skillframe.campaign.folder import FolderLock
-from skillframe.campaign.provenance import identity
+from skillframe.campaign import WHY, ClusterPool, Died, FolderLock, Raised, identity
 from skillframe_benchmarks import assembly
 from skillframe_benchmarks.assembly import DONE, AssemblyJob
 

@@ -15,7 +15,7 @@ import numpy as np
 from skillframe.frames import Float, matrix_from_quaternion, norm
 
 if TYPE_CHECKING:
-    from skillframe.execution.trace import Trace
+    from skillframe.execution import Trace
 
 SINK_M = 1e-3
 """Depth below the assembled pose that still counts as above the socket [m]; published 0, but contact is compliant in

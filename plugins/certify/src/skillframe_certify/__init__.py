@@ -9,8 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from skillframe import hookimpl
-from skillframe.extend.commands import LazyCommand
-from skillframe.extend.records import FolderType, Lazy
+from skillframe.extend import FolderType, Lazy, LazyCommand
 
 skillframe_contract = "0.2"
 

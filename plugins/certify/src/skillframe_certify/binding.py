@@ -14,12 +14,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from skillframe.campaign.folder import COPIES, campaign_hash, load
-from skillframe.campaign.partial_results import RanAgain, ran_again
-from skillframe.campaign.provenance import combined_hash, file_hashes, software
-from skillframe.campaign.sampling import Axis
-from skillframe.campaign.spec import CampaignSpec
-from skillframe.campaign.store import read_content
+from skillframe.campaign import (
+    COPIES,
+    Axis,
+    CampaignSpec,
+    RanAgain,
+    campaign_hash,
+    combined_hash,
+    file_hashes,
+    load,
+    ran_again,
+    read_content,
+    software,
+)
 from skillframe.errors import InputError
 from skillframe_certify.question import LOOK
 

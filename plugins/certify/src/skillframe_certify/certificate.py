@@ -13,12 +13,22 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from skillframe.campaign.folder import CAMPAIGN, COPIES, campaign_hash, load
-from skillframe.campaign.partial_results import RanAgain
-from skillframe.campaign.provenance import CODE, file_hash, file_hashes
-from skillframe.campaign.rows import Row, is_trial
-from skillframe.campaign.spec import CampaignSpec
-from skillframe.campaign.store import RESULTS, read_content, results_text
+from skillframe.campaign import (
+    CAMPAIGN,
+    CODE,
+    COPIES,
+    RESULTS,
+    CampaignSpec,
+    RanAgain,
+    Row,
+    campaign_hash,
+    file_hash,
+    file_hashes,
+    is_trial,
+    load,
+    read_content,
+    results_text,
+)
 from skillframe.errors import InputError
 from skillframe.files import write_whole
 from skillframe.files.documents import read_json

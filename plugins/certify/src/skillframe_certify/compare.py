@@ -31,7 +31,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from skillframe.campaign.statistics import confidence_sequence, mcnemar_sequentials, more_pairs, more_trials
+from skillframe.campaign import confidence_sequence, mcnemar_sequentials, more_pairs, more_trials
 from skillframe.frames import Float
 from skillframe_certify.trials import Trial, Trials
 

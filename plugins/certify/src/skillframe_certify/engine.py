@@ -9,12 +9,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.campaign.driver import Evaluate
-from skillframe.campaign.folder import Describe, campaign_hash, load
-from skillframe.campaign.rows import Row, is_trial
-from skillframe.campaign.runner import Options, Progress
-from skillframe.campaign.spec import CampaignSpec
-from skillframe.campaign.store import ordered, read_content
+from skillframe.campaign import (
+    CampaignSpec,
+    Describe,
+    Evaluate,
+    Options,
+    Progress,
+    Row,
+    campaign_hash,
+    is_trial,
+    load,
+    ordered,
+    read_content,
+)
 from skillframe.errors import InputError
 from skillframe.frames import Float
 

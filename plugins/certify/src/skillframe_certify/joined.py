@@ -29,12 +29,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.campaign.evaluate import evaluate
-from skillframe.campaign.folder import load
-from skillframe.campaign.rows import ChunkJob, is_trial
-from skillframe.campaign.sampling import Axis
-from skillframe.campaign.spec import CampaignSpec, Stop
-from skillframe.campaign.statistics import Interval, clopper_pearson, confidence_sequence
+from skillframe.campaign import (
+    Axis,
+    CampaignSpec,
+    ChunkJob,
+    Interval,
+    Stop,
+    clopper_pearson,
+    confidence_sequence,
+    evaluate,
+    is_trial,
+    load,
+)
 from skillframe.errors import InputError
 from skillframe_certify.engine import ends_of, rows_of_campaign
 from skillframe_certify.real_trials import Real
@@ -167,7 +173,7 @@ def _pairs(spec: CampaignSpec, real: Sequence[Real]) -> NDArray[np.bool_]:
     for first in range(0, len(real), CHUNK):
         trials = tuple(range(first, min(first + CHUNK, len(real))))
         job = ChunkJob(spec=paired.plain(), folder=str(spec.folder), skill=0, trials=trials)
-        for number, row in zip(trials, evaluate(job), strict=True):
+        for number, row in zip(trials, evaluate.evaluate(job), strict=True):
             if not is_trial(row):
                 raise InputError(f"trial {real[number].trial} of {real[number].skill}",
                                  "starts in collision in simulation", "check its samples")  # fmt: skip

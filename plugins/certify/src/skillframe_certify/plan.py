@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.campaign.store import repair_tail
+from skillframe.campaign import repair_tail
 from skillframe.errors import InputError
 from skillframe.files.documents import parse_json
 from skillframe.frames import Float

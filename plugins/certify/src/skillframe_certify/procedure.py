@@ -22,10 +22,19 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.campaign.folder import COPIES, campaign_hash, load, prepare, sweep_prepared
-from skillframe.campaign.provenance import environment, file_hashes, installed, software
-from skillframe.campaign.runner import run_campaign
-from skillframe.campaign.sampling import Axis
+from skillframe.campaign import (
+    COPIES,
+    Axis,
+    campaign_hash,
+    environment,
+    file_hashes,
+    installed,
+    load,
+    prepare,
+    run_campaign,
+    software,
+    sweep_prepared,
+)
 from skillframe.errors import InputError
 from skillframe.files import write_whole
 from skillframe.files.documents import read_json

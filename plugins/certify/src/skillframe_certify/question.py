@@ -10,10 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.campaign.folder import Describe, prepare
-from skillframe.campaign.runner import pick_label
-from skillframe.campaign.sampling import Axis
-from skillframe.campaign.spec import CampaignSpec, Expect, Stop
+from skillframe.campaign import Axis, CampaignSpec, Describe, Expect, Stop, pick_label, prepare
 from skillframe.errors import InputError
 from skillframe.files import write_whole
 from skillframe.files.documents import read_json

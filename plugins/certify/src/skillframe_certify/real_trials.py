@@ -20,9 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from skillframe.campaign.folder import FolderLock
-from skillframe.campaign.rows import REAL, SOURCE, real_or_simulated
-from skillframe.campaign.store import RESULTS
+from skillframe.campaign import REAL, RESULTS, SOURCE, FolderLock, real_or_simulated
 from skillframe.config import LARGEST
 from skillframe.errors import InputError
 from skillframe.files import sync_folder

@@ -16,12 +16,20 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from skillframe.campaign.folder import SCENE, SUMMARY, load, prepare, sweep, sweep_prepared
-from skillframe.campaign.provenance import file_hash
-from skillframe.campaign.runner import Progress, run_campaign
-from skillframe.campaign.sampling import Axis
-from skillframe.campaign.spec import CampaignSpec
-from skillframe.campaign.store import RESULTS
+from skillframe.campaign import (
+    RESULTS,
+    SCENE,
+    SUMMARY,
+    Axis,
+    CampaignSpec,
+    Progress,
+    file_hash,
+    load,
+    prepare,
+    run_campaign,
+    sweep,
+    sweep_prepared,
+)
 from skillframe.errors import InputError
 from skillframe.files.documents import read_json
 from skillframe.frames import Float
@@ -161,7 +169,7 @@ def is_complete(place: Path, params: type | None) -> bool:
 
 def next_sobol(folder: Path, question: Question, params: type | None) -> Callable[[int, int], Float]:
     """Return a function for points first .. last - 1, scaled, of the exploratory Sobol sequence."""
-    from skillframe.campaign.sampling import draws
+    from skillframe.campaign import draws
 
     base = load(folder / LOOK, params)
 

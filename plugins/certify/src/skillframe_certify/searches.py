@@ -17,9 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.campaign.folder import load
+from skillframe.campaign import load
 from skillframe.errors import InputError
-from skillframe.extend.drives import quantities
+from skillframe.extend import quantities
 from skillframe.files import write_whole
 from skillframe.files.documents import read_json
 from skillframe.frames import Float

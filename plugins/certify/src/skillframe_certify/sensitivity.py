@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.campaign.statistics import Interval, holm, mcnemar
+from skillframe.campaign import Interval, holm, mcnemar
 from skillframe.frames import Float
 from skillframe_certify.border import ToTry
 from skillframe_certify.engine import Looked, Say

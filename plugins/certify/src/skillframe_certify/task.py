@@ -20,8 +20,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from skillframe.campaign.folder import to_lines
-from skillframe.campaign.spec import DURATION_S
+from skillframe.campaign import DURATION_S, to_lines
 from skillframe.config import build, read_toml
 from skillframe.errors import InputError
 from skillframe.files import write_whole

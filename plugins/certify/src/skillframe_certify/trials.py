@@ -17,8 +17,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from skillframe.campaign.rows import LEFT_OUT, TRUTH, is_torn, is_trial, real_or_simulated
-from skillframe.demonstration.table import read_text
+from skillframe.campaign import LEFT_OUT, TRUTH, is_torn, is_trial, real_or_simulated
+from skillframe.demonstration import read_text
 from skillframe.errors import InputError
 
 POLICY = ("policy", "skill", "method")

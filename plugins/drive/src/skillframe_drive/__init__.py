@@ -10,8 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from skillframe import hookimpl
-from skillframe.extend.commands import LazyCommand
-from skillframe.extend.records import Lazy, SectionType
+from skillframe.extend import Lazy, LazyCommand, SectionType
 
 skillframe_contract = "0.2"
 

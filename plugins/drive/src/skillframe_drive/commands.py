@@ -143,8 +143,8 @@ def identify(cell: Path, as_json: bool) -> int:
     Example:
       skillframe drive identify cell.toml
     """
-    from skillframe.campaign.folder import to_lines
-    from skillframe.cli.output import emit_json
+    from skillframe.campaign import to_lines
+    from skillframe.cli import emit_json
     from skillframe_drive.cell import load_cell
     from skillframe_drive.identify import identify as measured
     from skillframe_drive.identify import toml_lines
@@ -189,7 +189,7 @@ def hold(
       skillframe drive hold run.npz --certificate certified --out held
       skillframe report held --out held.html
     """
-    from skillframe.cli.output import emit_json, note
+    from skillframe.cli import emit_json, note
     from skillframe_drive.hold import (
         compare,
         covering,
@@ -268,9 +268,9 @@ def fake(
     """
     from skillframe.config import parse_setting
     from skillframe.errors import InputError, UnknownName
-    from skillframe.extend.registry import registry
-    from skillframe.robot.spec import load_robot
-    from skillframe.world.quantities import SensorSettings
+    from skillframe.extend import registry
+    from skillframe.robot import load_robot
+    from skillframe.world import SensorSettings
     from skillframe_drive.fake import FAULTS, FakeArm
     from skillframe_drive.link import INTERFACES
 

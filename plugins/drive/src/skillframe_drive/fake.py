@@ -14,12 +14,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from skillframe.control.motors import InnerLoop, Motors, joint_limits
-from skillframe.execution.drive import Setup
-from skillframe.execution.drives.torque import OneArm
-from skillframe.execution.prepare import load_robot_model, load_world, split_settings
+from skillframe.control import InnerLoop, Motors, joint_limits
+from skillframe.execution import OneArm, Setup, load_robot_model, load_world, split_settings
 from skillframe.frames import Float, Pose
-from skillframe.world.quantities import SensorSettings
+from skillframe.world import SensorSettings
 from skillframe_drive.link import SILENT_S
 
 FAULTS = {

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.execution.trace import Trace
+from skillframe.execution import Trace
 from skillframe.frames import Float, matrix_from_quaternion, rotation_vector
 
 AXES = "xyz"

@@ -22,18 +22,25 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from skillframe.campaign.evaluate import evaluate
-from skillframe.campaign.folder import campaign_hash, load, to_lines
-from skillframe.campaign.provenance import combined_hash
-from skillframe.campaign.rows import TRACE, ChunkJob, is_trial
-from skillframe.campaign.sampling import Axis
-from skillframe.campaign.spec import CampaignSpec, Expect, Stop
+from skillframe.campaign import (
+    TRACE,
+    Axis,
+    CampaignSpec,
+    ChunkJob,
+    Expect,
+    Stop,
+    campaign_hash,
+    combined_hash,
+    evaluate,
+    is_trial,
+    load,
+    to_lines,
+)
 from skillframe.config.units import shown
-from skillframe.document.file import load_skill
+from skillframe.document import load_skill
 from skillframe.errors import InputError
-from skillframe.execution.prepare import load_world
-from skillframe.execution.trace import Trace
-from skillframe.extend.drives import quantities
+from skillframe.execution import Trace, load_world
+from skillframe.extend import quantities
 from skillframe.files import write_whole
 from skillframe.files.documents import read_json
 from skillframe.frames import Float
@@ -205,7 +212,7 @@ def simulate_box(
         done = 0
         pool = ProcessPoolExecutor(workers, get_context("spawn")) if workers > 1 else None
         with pool or nullcontext():
-            for rows in (pool.map if pool else map)(evaluate, jobs):
+            for rows in (pool.map if pool else map)(evaluate.evaluate, jobs):
                 for row in rows:
                     if is_trial(row):
                         path.write_bytes(row[TRACE])

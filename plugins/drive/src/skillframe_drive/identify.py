@@ -29,12 +29,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from skillframe.demonstration.convention import GRAVITY
+from skillframe.demonstration import GRAVITY
 from skillframe.errors import InputError, SkillframeError
-from skillframe.execution.drive import Setup
+from skillframe.execution import Setup
 from skillframe.frames import Float, skew
-from skillframe.robot.interface import LOOP_DAMPING, Control
-from skillframe.robot.kinematics import tool_pose
+from skillframe.robot import LOOP_DAMPING, Control, tool_pose
 from skillframe_drive.link import Link, RobotState
 from skillframe_drive.real import MOST_MISSED, RealLimb
 from skillframe_drive.runs import Line, Task

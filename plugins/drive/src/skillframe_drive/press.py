@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from skillframe.frames import Float
-from skillframe.robot.kinematics import tool_pose
+from skillframe.robot import tool_pose
 from skillframe_drive.link import Link, RobotState
 from skillframe_drive.runs import Line, Task
 

@@ -16,17 +16,13 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.control.limits import LimitGuard
+from skillframe.control import LimitGuard
 from skillframe.errors import InputError
-from skillframe.execution.drive import PacedSkill, Setup, Trials
-from skillframe.execution.drives.admittance import AdmittanceDrive
-from skillframe.execution.drives.torque import HOLD, Gauge, TorqueDrive
-from skillframe.execution.result import Result
-from skillframe.extend.records import DriveType
+from skillframe.execution import HOLD, AdmittanceDrive, Gauge, PacedSkill, Result, Setup, TorqueDrive, Trials
+from skillframe.extend import DriveType
 from skillframe.frames import Float, Pose, move_wrench, norm, rotate
 from skillframe.skill import Broken, Command, Ended, Skill, no_reasons
-from skillframe.world.placement import fixture_poses
-from skillframe.world.plant import Draws, Kinematics, Plant
+from skillframe.world import Draws, Kinematics, Plant, fixture_poses
 from skillframe_drive.link import ImpedanceLink, Link, RobotState, Spring
 
 TARE_S = 0.2

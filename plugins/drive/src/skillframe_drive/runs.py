@@ -9,18 +9,24 @@ from typing import Any
 import numpy as np
 
 from skillframe import LearnedSkill, SingleRun
-from skillframe.campaign.provenance import combined_hash
+from skillframe.campaign import combined_hash
 from skillframe.errors import InputError, SkillframeError
-from skillframe.execution.drive import PacedSkill, Setup
-from skillframe.execution.executor import simulate
-from skillframe.execution.prepare import load_robot_model, load_world, prepare, split_settings
-from skillframe.execution.result import SIMULATED, force_source
-from skillframe.extend.registry import registry
+from skillframe.execution import (
+    SIMULATED,
+    PacedSkill,
+    Setup,
+    force_source,
+    load_robot_model,
+    load_world,
+    prepare,
+    simulate,
+    split_settings,
+)
+from skillframe.extend import registry
 from skillframe.frames import Float, norm
-from skillframe.robot.model import RobotModel
+from skillframe.robot import RobotModel
 from skillframe.skill import Command, Observation, Skill
-from skillframe.world.placement import start_configurations
-from skillframe.world.scene import Scene
+from skillframe.world import Scene, start_configurations
 from skillframe_drive.cell import Cell
 from skillframe_drive.link import INTERFACES, Link, RobotState
 from skillframe_drive.real import drive_type

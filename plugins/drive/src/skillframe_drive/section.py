@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.extend.records import Grid, Illustration, ReportFiles
+from skillframe.extend import Grid, Illustration, ReportFiles
 from skillframe.files.documents import read_json
 from skillframe.frames import Float
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from skillframe import hookimpl
-from skillframe.extend.records import CoordinatorType, Lazy, WorldType
+from skillframe.extend import CoordinatorType, Lazy, WorldType
 
 skillframe_contract = "0.2"
 

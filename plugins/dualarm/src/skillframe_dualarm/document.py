@@ -12,9 +12,9 @@ from typing import Any, Literal
 import numpy as np
 
 from skillframe.config import build
-from skillframe.document.frame import frame_at
+from skillframe.document import frame_at
 from skillframe.errors import InputError, UnknownName
-from skillframe.extend.records import Document
+from skillframe.extend import Document
 from skillframe.frames import Float, norm
 
 Vector = tuple[float, float, float]

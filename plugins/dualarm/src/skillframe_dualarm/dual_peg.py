@@ -13,8 +13,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float, norm
-from skillframe.world.scene import Geom, Holder, Scene, State, Task, Tool
-from skillframe.world.shapes import FLOOR, TOOL_COLOUR, TOOL_DOWN, hole, insertion, require, shaft, tilt_of
+from skillframe.world import (
+    FLOOR,
+    TOOL_COLOUR,
+    TOOL_DOWN,
+    Geom,
+    Holder,
+    Scene,
+    State,
+    Task,
+    Tool,
+    hole,
+    insertion,
+    require,
+    shaft,
+    tilt_of,
+)
 
 REACH = 0.15  # from the flange to tip and hole entrance [m]
 

@@ -12,11 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from skillframe.config import build
-from skillframe.demonstration.record import Demonstration
-from skillframe.document.frame import common_frames
+from skillframe.demonstration import Demonstration
+from skillframe.document import common_frames
 from skillframe.errors import InputError
-from skillframe.extend.records import Document, LearnOptions
-from skillframe.extend.registry import registry
+from skillframe.extend import Document, LearnOptions, registry
 from skillframe.frames import norm
 from skillframe_dualarm.document import Arm, Mode, Phase, Vector, body, configured, relative
 

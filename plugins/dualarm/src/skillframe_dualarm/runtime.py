@@ -18,7 +18,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.extend.records import Document
+from skillframe.extend import Document
 from skillframe.frames import Float, Pose, dot, pose_error, rotate
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 from skillframe_dualarm.document import Arm, Phase, read_phase

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from skillframe import hookimpl
-from skillframe.extend.records import Lazy, LinkType
+from skillframe.extend import Lazy, LinkType
 
 skillframe_contract = "0.2"
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import gymnasium
 
-from skillframe.extend.registry import registry
+from skillframe.extend import registry
 from skillframe_gym.settings import ROBOTS
 
 __all__ = ["NAMESPACE", "names"]

@@ -20,10 +20,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from skillframe.api.inputs import Robot, Settings, World, robot_of, scene_of
-from skillframe.demonstration.record import resolve_point
+from skillframe.api import Robot, Settings, World, robot_of, scene_of
+from skillframe.demonstration import resolve_point
 from skillframe.errors import InputError, SkillframeError, UnknownName
-from skillframe.execution.drive import Setup
+from skillframe.execution import Setup
 from skillframe.frames import Float
 from skillframe_gym.episodes import Cohort, Seen
 from skillframe_gym.pictures import Camera

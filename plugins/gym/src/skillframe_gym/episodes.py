@@ -13,9 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.errors import InputError
-from skillframe.execution.drive import Setup
-from skillframe.execution.executor import Loop, begin, require_starts
-from skillframe.execution.recorder import ratio
+from skillframe.execution import Loop, Setup, begin, ratio, require_starts
 from skillframe.frames import Float, Pose, quaternion_from_matrix, rotation_matrix
 from skillframe.skill import Command, Ended, Impedance, Observation, Skill, no_reasons
 from skillframe_gym.settings import LARGEST, EnvSettings

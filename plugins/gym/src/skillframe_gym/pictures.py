@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from skillframe_reports.scene_picture import View
 
-from skillframe.execution.recorder import geom_json
+from skillframe.execution import geom_json
 from skillframe.frames import Pose
-from skillframe.world.scene import Scene
+from skillframe.world import Scene
 
 WIDTH, HEIGHT = 320, 240
 """Pixels."""

@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 
-from skillframe.campaign.sampling import Axis, parse_axis
+from skillframe.campaign import Axis, parse_axis
 from skillframe.errors import InputError, UnknownName
-from skillframe.extend.drives import quantities, unknown
+from skillframe.extend import quantities, unknown
 from skillframe.frames import Float
 
 ROBOTS = {"pallets": "hiab_xs031", "edge": "free_tool"}

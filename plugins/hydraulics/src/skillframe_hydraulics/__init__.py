@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from skillframe import hookimpl
-from skillframe.extend.records import DriveType, Lazy
+from skillframe.extend import DriveType, Lazy
 
 skillframe_contract = "0.2"
 

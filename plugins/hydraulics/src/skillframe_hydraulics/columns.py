@@ -18,7 +18,7 @@ from skillframe_hydraulics.law.generated import Batch
 from skillframe_hydraulics.symbolic_or_numeric import maximum
 
 if TYPE_CHECKING:
-    from skillframe.fmu.actuator import Actuators
+    from skillframe.fmu import Actuators
 
 __all__ = ["EnergyBill", "columns"]
 

@@ -9,8 +9,7 @@ from typing import Literal
 
 from skillframe.config import build
 from skillframe.errors import InputError, UnknownName
-from skillframe.robot.spec import RobotFile, RobotSpec
-from skillframe.robot.tables import Actuation
+from skillframe.robot import Actuation, RobotFile, RobotSpec
 
 LEAST_CORNER, LARGEST_CORNER = 5.0, 0.08
 """Filter corners: least [Hz], which lags by 64 ms; largest share of the control rate (unstable from 0.13)."""

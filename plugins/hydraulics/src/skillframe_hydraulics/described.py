@@ -15,7 +15,7 @@ from typing import Any
 
 from skillframe.config.units import si
 from skillframe.errors import InputError, UnknownName
-from skillframe.robot.tables import Actuation
+from skillframe.robot import Actuation
 
 SHORT = ("cylinder", "motor", "defaults")
 DRAWN = ("closed", "stroke", "mass")

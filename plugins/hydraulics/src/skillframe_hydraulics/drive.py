@@ -15,20 +15,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from skillframe.control.limits import LimitGuard
+from skillframe.control import LimitGuard
 from skillframe.errors import InputError
-from skillframe.execution.drive import Setup, Shares, Trials
-from skillframe.execution.drives.actuated import Actuated
-from skillframe.execution.recorder import Recorder, WithColumns
-from skillframe.execution.result import Result
-from skillframe.fmu.opening import unmapped
+from skillframe.execution import Actuated, Recorder, Result, Setup, Shares, Trials, WithColumns
+from skillframe.fmu import unmapped
 from skillframe.frames import Float, norm
-from skillframe.robot.chain import ClosedChain
+from skillframe.robot import ClosedChain
 from skillframe.signals import CommandDelay
 from skillframe.skill import Broken, Command, Ended, Observation
-from skillframe.world.placement import fixture_poses, start_poses
-from skillframe.world.plant import Draws, Plant
-from skillframe.world.scene import Scene
+from skillframe.world import Draws, Plant, Scene, fixture_poses, start_poses
 from skillframe_hydraulics.checks.feasibility import areas, require_feasible, require_held
 from skillframe_hydraulics.checks.figures import CYLINDER
 from skillframe_hydraulics.checks.pumps import swing_part, unfit_pumps

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 
-from skillframe.control.limits import Glance, LimitGuard
+from skillframe.control import Glance, LimitGuard
 from skillframe.frames import Float, Pose
 from skillframe.skill import Command, Observation
 from skillframe_hydraulics.force.compiled import CompiledEstimator

@@ -9,15 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from skillframe.errors import InputError, SkillframeError
-from skillframe.robot.model import RobotModel
-from skillframe.robot.spec import RobotSpec
+from skillframe.robot import RobotModel, RobotSpec
 from skillframe_hydraulics.checks.figures import require_figures
 from skillframe_hydraulics.declared import fed, gains_of, noise_of, require_declared, supplies_of
 from skillframe_hydraulics.law.gains import missing_gains, with_derived_gains
 
 if TYPE_CHECKING:
-    from skillframe.execution.drive import Setup
-    from skillframe.world.plant import Draws
+    from skillframe.execution import Setup
+    from skillframe.world import Draws
     from skillframe_hydraulics.drive import MachineDrive
 
 

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.errors import InputError
-from skillframe.fmu.actuator import Actuators
+from skillframe.fmu import Actuators
 from skillframe.frames import Float
-from skillframe.robot.chain import ClosedChain
+from skillframe.robot import ClosedChain
 from skillframe_hydraulics.quantities import FAULTS
 from skillframe_hydraulics.sensors import MachineSensors
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from skillframe.execution.trace import Trace
-from skillframe.extend.records import Curve, TimePlot, actuator_curves
+from skillframe.execution import Trace
+from skillframe.extend import Curve, TimePlot, actuator_curves
 
 PRESSURE_CAPTION = "Measured behind the filters; full: piston side, dashed: rod side."
 VALVE_CAPTION = "Commanded opening of the valves."

@@ -9,11 +9,11 @@ import numpy as np
 
 from skillframe.config.units import Quantity, Range
 from skillframe.frames import Float
-from skillframe.robot.spec import RobotSpec
-from skillframe.world.quantities import OF_ACTUATORS, unfit_payload
+from skillframe.robot import RobotSpec
+from skillframe.world import OF_ACTUATORS, unfit_payload
 
 if TYPE_CHECKING:
-    from skillframe.robot.model import RobotModel
+    from skillframe.robot import RobotModel
 
 
 def _unfit_switch(values: Float, robot: RobotModel | None) -> tuple[str, str] | None:

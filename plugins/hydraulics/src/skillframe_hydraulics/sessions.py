@@ -20,19 +20,14 @@ from skillframe_teaching.sessions import (
     start_columns,
 )  # fmt: skip
 
-from skillframe.demonstration.columns import WRENCH
-from skillframe.demonstration.convention import STANDARD, UNMEASURED
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import STANDARD, UNMEASURED, WRENCH, Demonstration
 from skillframe.errors import InputError
-from skillframe.execution.executor import Result, Setup, simulate
-from skillframe.execution.trace import Trace
-from skillframe.extend.reading import Recording
+from skillframe.execution import Result, Setup, Trace, simulate
+from skillframe.extend import Recording
 from skillframe.frames import Float
-from skillframe.robot.chain import ClosedChain
-from skillframe.robot.model import RobotModel
+from skillframe.robot import ClosedChain, RobotModel
 from skillframe.skill import Status
-from skillframe.world.placement import fixture_poses
-from skillframe.world.scene import Scene
+from skillframe.world import Scene, fixture_poses
 from skillframe_hydraulics.law.hydraulic import tool_axes
 from skillframe_hydraulics.teleoperation import Operator, OperatorSettings, require_stable_loop
 

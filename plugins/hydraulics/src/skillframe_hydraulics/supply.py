@@ -25,9 +25,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.fmu.actuator import Actuators
+from skillframe.fmu import Actuators
 from skillframe.frames import Float
-from skillframe.robot.spec import RobotSpec
+from skillframe.robot import RobotSpec
 from skillframe_hydraulics.declared import fed, supplies_of
 
 NEEDED_IN, NEEDED_OUT = "supply_drop", ("flow_supply", "supply_slope")

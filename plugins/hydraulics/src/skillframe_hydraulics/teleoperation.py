@@ -29,7 +29,7 @@ from skillframe.errors import InputError
 from skillframe.frames import Float, Pose
 from skillframe.signals import CommandDelay, RateFilter, require_delay
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
-from skillframe.world.scene import Task
+from skillframe.world import Task
 
 __all__ = ["Operator", "OperatorSettings", "TeleoperationChannel", "loop_gain", "require_stable_loop"]
 

@@ -19,12 +19,10 @@ from pathlib import Path
 import numpy as np
 from skillframe_gym.settings import SOFTEST, STIFFEST, EnvSettings
 
-from skillframe.demonstration.record import resolve_point
-from skillframe.document.file import load, understood
-from skillframe.document.frame import read_frame, with_center
+from skillframe.demonstration import resolve_point
+from skillframe.document import load, read_frame, understood, with_center
 from skillframe.errors import InputError
-from skillframe.extend.records import CoordinatorType, Document
-from skillframe.extend.registry import registry
+from skillframe.extend import CoordinatorType, Document, registry
 from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, rotate, rotation_vector, skew
 from skillframe.skill import Command, Observation, Skill, Status
 

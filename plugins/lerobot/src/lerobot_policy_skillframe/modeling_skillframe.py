@@ -21,9 +21,9 @@ from lerobot_policy_skillframe.configuration_skillframe import (
     SkillframeConfig,
 )
 from lerobot_policy_skillframe.following import Following, Points, read_skill
-from skillframe.document.file import save
+from skillframe.document import save
 from skillframe.errors import InputError
-from skillframe.extend.records import Document
+from skillframe.extend import Document
 from skillframe.frames import Float
 
 SKILL_FILE = "policy.skill.json"

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from skillframe import hookimpl
-from skillframe.extend.records import Lazy, SkillType
+from skillframe.extend import Lazy, SkillType
 
 skillframe_contract = "0.2"
 

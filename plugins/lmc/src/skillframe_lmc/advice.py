@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from skillframe.extend.records import Document
+from skillframe.extend import Document
 from skillframe_lmc.describe import known_rad
 from skillframe_lmc.evidence import NO_TORQUE, NOT_ONE_MOTION
 from skillframe_lmc.phase import Part, read_phase

@@ -6,8 +6,8 @@ from math import acos, degrees, pi
 
 import numpy as np
 
-from skillframe.document.frame import SkillFrame, read_frame
-from skillframe.extend.records import Document
+from skillframe.document import SkillFrame, read_frame
+from skillframe.extend import Document
 from skillframe_lmc.phase import Part, Phase, read_phase
 from skillframe_lmc.words import axis_words, direction_words, exact_words, listed
 

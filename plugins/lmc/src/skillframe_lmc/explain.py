@@ -6,7 +6,7 @@ import io
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from skillframe.extend.records import Document, Illustration
+from skillframe.extend import Document, Illustration
 from skillframe_lmc import pictures
 from skillframe_lmc.phase import Part, read_phase
 

@@ -17,8 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.convention import measures_torque
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import Demonstration, measures_torque
 from skillframe.errors import InputError
 from skillframe.frames import Float, Pose, continuous, cross, matrix_from_quaternion, norm, rotate, rotation_vector
 from skillframe_lmc.settings import LEVER_M, Settings

@@ -27,11 +27,10 @@ from typing import NamedTuple
 import numpy as np
 
 from skillframe.config import build
-from skillframe.demonstration.convention import measures_torque
-from skillframe.demonstration.record import Demonstration
-from skillframe.document.frame import frame_of
+from skillframe.demonstration import Demonstration, measures_torque
+from skillframe.document import frame_of
 from skillframe.errors import InputError
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend import Document, LearnOptions
 from skillframe.frames import Float, norm, unit
 from skillframe_lmc import evidence, intervals
 from skillframe_lmc.axes import TURNED, compliant_axes, straightness

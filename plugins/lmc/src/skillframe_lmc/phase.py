@@ -10,7 +10,7 @@ import numpy as np
 
 from skillframe.config import build, coerce
 from skillframe.errors import InputError
-from skillframe.extend.records import Document
+from skillframe.extend import Document
 from skillframe.frames import Float, norm
 from skillframe_lmc.evidence_check import check_evidence
 

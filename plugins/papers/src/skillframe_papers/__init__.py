@@ -4,6 +4,6 @@ Reading order: `published` (rows and thresholds), `rows` (computation), `jobs`, 
 `committed`. `skillframe --help` imports this module only.
 """
 
-from skillframe.extend.commands import LazyCommand
+from skillframe.extend import LazyCommand
 
 reproduce = LazyCommand("The papers' results, row by row.", "skillframe_papers.command:command")

@@ -10,8 +10,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 
-from skillframe.campaign.statistics import clopper_pearson
-from skillframe.extend.records import Verdict
+from skillframe.campaign import clopper_pearson
+from skillframe.extend import Verdict
 
 ROUNDING = 1e-9
 SAID = (

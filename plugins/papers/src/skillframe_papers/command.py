@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from skillframe.cli.options import COUNT, SEED
-from skillframe.cli.output import note, terminable
+from skillframe.cli import COUNT, SEED, note, terminable
 
 if TYPE_CHECKING:
     from skillframe_papers.runner import Outcome
@@ -43,7 +42,7 @@ def command(
       skillframe reproduce 2 --set world.friction=0.3 --out rougher
     """
     from skillframe.config import parse_setting
-    from skillframe.extend.registry import registry
+    from skillframe.extend import registry
     from skillframe_papers.jobs import jobs_of
     from skillframe_papers.runner import run
 
@@ -63,7 +62,7 @@ def command(
 
 
 def _list(rows: Sequence[Any], as_json: bool) -> int:
-    from skillframe.cli.output import PAGE_WIDTH, emit_json, table
+    from skillframe.cli import PAGE_WIDTH, emit_json, table
 
     keys = ("summary", "published", "source", "bar", "frozen", "calibrated", "weak")
     found = [{"row": r.name, **{k: getattr(r, k) for k in keys}, "settings": dict(r.settings)} for r in rows]
@@ -107,7 +106,7 @@ def _end(outcome: Outcome, out: Path, quick: bool, as_json: bool, interrupted: i
 
 
 def _show(entries: Sequence[Mapping[str, Any]], as_json: bool) -> None:
-    from skillframe.cli.output import PAGE_WIDTH, emit_json, table
+    from skillframe.cli import PAGE_WIDTH, emit_json, table
     from skillframe_papers import store
     from skillframe_papers.bars import with_intervals
 

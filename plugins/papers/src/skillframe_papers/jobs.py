@@ -11,8 +11,7 @@ from typing import Any
 
 from skillframe.config import coerce
 from skillframe.errors import UnknownName
-from skillframe.extend.records import RowType
-from skillframe.extend.registry import Registry
+from skillframe.extend import Registry, RowType
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from skillframe.extend.records import Lazy, RowType
+from skillframe.extend import Lazy, RowType
 
 OVERVIEW = "the overview paper (Suomalainen), section on learning from force"
 TWO_ARMS = "Suomalainen, Calinon, Pignat, Kyrki, ICRA 2019"

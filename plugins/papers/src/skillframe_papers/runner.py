@@ -17,12 +17,9 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, Literal, NamedTuple
 
-from skillframe.campaign.cluster import ClusterPool
-from skillframe.campaign.driver import WHY, Answer, Died, Pool
-from skillframe.campaign.provenance import identity
+from skillframe.campaign import WHY, Answer, ClusterPool, Died, Pool, identity
 from skillframe.errors import SkillframeError
-from skillframe.extend.records import RowRun
-from skillframe.extend.registry import registry
+from skillframe.extend import RowRun, registry
 from skillframe_papers import store
 from skillframe_papers.jobs import Job
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from skillframe.errors import InputError
-from skillframe.extend.records import RowResult, RowType
+from skillframe.extend import RowResult, RowType
 from skillframe.files import write_whole
 from skillframe.files.documents import read_json
 from skillframe_papers.jobs import Job

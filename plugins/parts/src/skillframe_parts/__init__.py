@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from skillframe import hookimpl
-from skillframe.extend.commands import LazyCommand
-from skillframe.extend.records import Lazy, WorldFileType
+from skillframe.extend import Lazy, LazyCommand, WorldFileType
 
 skillframe_contract = "0.2"
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import click
 
-from skillframe.cli.output import note
+from skillframe.cli import note
 from skillframe.errors import InputError
 
 

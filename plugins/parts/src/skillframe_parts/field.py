@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float, cross, norm
-from skillframe.world.surfaces import DistanceGrid, Surface, Triangles, exact_distances, grid_of, triangles_of
+from skillframe.world import DistanceGrid, Surface, Triangles, exact_distances, grid_of, triangles_of
 from skillframe_parts.solid import Faces, arrays_of
 
 MOST_NODES, _COARSE_NODES = 3e6, 2e5

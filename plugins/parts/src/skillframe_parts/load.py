@@ -11,7 +11,7 @@ import numpy as np
 
 from skillframe.errors import InputError
 from skillframe.frames import Float
-from skillframe.world.surfaces import Surface, available
+from skillframe.world import Surface, available
 from skillframe_parts.checks import (
     SHARE,
     around,

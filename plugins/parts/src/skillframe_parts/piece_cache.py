@@ -16,8 +16,7 @@ import numpy as np
 
 from skillframe.errors import SkillframeWarning
 from skillframe.files import cache_dir, write_whole
-from skillframe.robot import meshes
-from skillframe.robot.meshes import Hull
+from skillframe.robot import Hull, meshes
 from skillframe_parts import pieces, sections
 from skillframe_parts.pieces import ConvexPieces
 from skillframe_parts.solid import arrays_of

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from skillframe.frames import Float, cross, norm
-from skillframe.robot.meshes import SMALLEST, Hull, hull_of
+from skillframe.robot import SMALLEST, Hull, hull_of
 from skillframe_parts.sections import levels_of, section
 from skillframe_parts.solid import arrays_of, solid_of, united
 

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from skillframe.errors import InputError
-from skillframe.extend.records import WorldType
+from skillframe.extend import WorldType
 
 
 def world_of_file(path: Path) -> WorldType:

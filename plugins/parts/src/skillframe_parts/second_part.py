@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from skillframe.errors import InputError
 from skillframe.frames import Float
-from skillframe.world.convert import FASTEST_SWING, TIMESTEP
-from skillframe.world.scene import MOVES, Geom, Mover, State, Vector
+from skillframe.world import FASTEST_SWING, MOVES, TIMESTEP, Geom, Mover, State, Vector
 from skillframe_parts.checks import SHARE, check_error
 from skillframe_parts.declared import DENSITY
 from skillframe_parts.field import error_of, surface_of

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from skillframe.errors import InputError, need
 from skillframe.frames import Float, cross
-from skillframe.robot.meshes import LARGEST_FILE
+from skillframe.robot import LARGEST_FILE
 from skillframe_parts import step
 from skillframe_parts.contents import check_contents, no_number
 from skillframe_parts.declared import SCALES

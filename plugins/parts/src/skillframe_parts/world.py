@@ -16,8 +16,21 @@ from numpy.typing import NDArray
 
 from skillframe.config import require_ranges
 from skillframe.frames import Float, matrix_from_quaternion, norm, quaternion_from_matrix
-from skillframe.world.scene import REACTION_S, Geom, HandStop, Scene, State, Task, Tool
-from skillframe.world.shapes import FIXTURE_COLOUR, TOOL_COLOUR, TOOL_DOWN, insertion, shaft, tilt_of
+from skillframe.world import (
+    FIXTURE_COLOUR,
+    REACTION_S,
+    TOOL_COLOUR,
+    TOOL_DOWN,
+    Geom,
+    HandStop,
+    Scene,
+    State,
+    Task,
+    Tool,
+    insertion,
+    shaft,
+    tilt_of,
+)
 from skillframe_parts.declared import FixtureFile, read_fixture
 from skillframe_parts.fit import corners, lowest, nothing_stops
 from skillframe_parts.load import LoadedParts, PreparedPart, load

@@ -13,20 +13,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.assemble import NOTES
-from skillframe.demonstration.checks import GAP, angles_between
-from skillframe.demonstration.contact import (
+from skillframe.demonstration import (
+    COPY,
+    GAP,
     LEVEL_TIME,
+    NOTES,
+    POSE,
     Contact,
+    Demonstration,
+    Flaw,
     NoiseFigures,
+    angles_between,
+    as_meta,
     contact_evidence,
     contact_strength,
+    flaws_as_meta,
     free_air_level,
 )
-from skillframe.demonstration.faults import fault
-from skillframe.demonstration.faults.fault import Flaw
-from skillframe.demonstration.record import Demonstration
-from skillframe.demonstration.stalls import POSE, as_meta
 from skillframe.errors import InputError
 from skillframe.frames import Float, norm
 from skillframe_recordings.conditioning.offline import remove_bias
@@ -108,7 +111,7 @@ def audit(demonstration: Demonstration) -> DemonstrationAudit:
     period = float(np.median(step))
     contacts, found, wrong, live, touching, noise, level = contact_evidence(d)
     dark = [s.stop for s in found if s.what != POSE]
-    dark += [f.stop for f in wrong if f.kind == fault.COPY and f.what != POSE]
+    dark += [f.stop for f in wrong if f.kind == COPY and f.what != POSE]
     unseen = [c.start for c in contacts if any(0.0 <= c.start - stop < LEVEL_TIME for stop in dark)]
     drift = _drift(d, contacts, level, live)
     # at 20 Hz, so that noise does not accumulate
@@ -143,7 +146,7 @@ def audit(demonstration: Demonstration) -> DemonstrationAudit:
         drift=None if drift is None else drift.tolist(), spikes=len(broken_samples(d)),
         peak_force_n=float(norm(d.wrench[:, :3]).max()),
         contact_threshold_n=contact_strength(d.time, d.wrench, noise, level, touching)[1],
-        contacts=[list(contact) for contact in contacts], stalls=as_meta(found), faults=fault.as_meta(wrong),
+        contacts=[list(contact) for contact in contacts], stalls=as_meta(found), faults=flaws_as_meta(wrong),
         onsets_unseen=unseen,
         wrench_late_s=None if late is None else late.seconds,
         notes=list(d.meta.get(NOTES, [])), warnings=warnings,

@@ -18,8 +18,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.faults.find import alive
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import Demonstration, alive
 from skillframe.frames import Float, norm
 from skillframe_recordings.thresholds import AUDIT
 

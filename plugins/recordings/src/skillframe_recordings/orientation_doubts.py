@@ -13,8 +13,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from skillframe.demonstration.contact import LEVEL_TIME
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import LEVEL_TIME, Demonstration
 from skillframe.frames import Float, matrix_from_quaternion, norm, rotate, rotation_vector
 from skillframe_recordings.thresholds import AUDIT
 

@@ -16,11 +16,17 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.checks import GAP, WORK_COSINE, Turning, weight_evidence, work_cosine
-from skillframe.demonstration.columns import WRENCH
-from skillframe.demonstration.convention import UNMEASURED
-from skillframe.demonstration.faults.find import alive
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import (
+    GAP,
+    UNMEASURED,
+    WORK_COSINE,
+    WRENCH,
+    Demonstration,
+    Turning,
+    alive,
+    weight_evidence,
+    work_cosine,
+)
 from skillframe.frames import Float, norm
 from skillframe_recordings.orientation_doubts import tared, w_first
 from skillframe_recordings.thresholds import AUDIT

@@ -11,8 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from skillframe import hookimpl
-from skillframe.extend.commands import LazyCommand
-from skillframe.extend.records import Lazy, OutputType, RequirementType, SectionType
+from skillframe.extend import Lazy, LazyCommand, OutputType, RequirementType, SectionType
 
 skillframe_contract = "0.2"
 

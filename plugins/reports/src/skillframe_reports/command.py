@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from skillframe.cli.options import PAGE
+from skillframe.cli import PAGE
 
 
 @click.command()
@@ -31,7 +31,7 @@ def command(inputs: tuple[Path, ...], out: Path, watch: bool, as_json: bool) -> 
       skillframe report run1.npz run2.npz --out runs.html
       skillframe report results/peg --out peg.html --watch
     """
-    from skillframe.cli.output import emit_json
+    from skillframe.cli import emit_json
     from skillframe_reports.page import anchor_of, write_chapters
     from skillframe_reports.sources import read_chapters, scenes
 
@@ -59,7 +59,7 @@ def command(inputs: tuple[Path, ...], out: Path, watch: bool, as_json: bool) -> 
 
 def _watched(inputs: tuple[Path, ...], out: Path) -> int:
     """Update the page until every campaign has ended and return the exit code of an interruption."""
-    from skillframe.cli.output import note, terminable
+    from skillframe.cli import note, terminable
     from skillframe_reports.watch import watch_report
 
     with terminable() as code:

@@ -11,8 +11,8 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
 
-from skillframe.demonstration.record import Demonstration
-from skillframe.extend.records import Document
+from skillframe.demonstration import Demonstration
+from skillframe.extend import Document
 from skillframe_reports.demonstration_curves import axis, lanes_of
 from skillframe_reports.markup import Markup, join, json_script, note, tag
 from skillframe_reports.shell import asset, bar, head

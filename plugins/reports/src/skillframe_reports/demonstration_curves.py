@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.record import Demonstration
-from skillframe.extend.records import Curve
+from skillframe.demonstration import Demonstration
+from skillframe.extend import Curve
 from skillframe.frames import Float, norm
 from skillframe_reports.markup import Markup, join, number, tag
 from skillframe_reports.plots import LEAST_RANGE, components, doubted, shades, turned

@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.campaign.sampling import parse_axis
-from skillframe.campaign.spec import name_of
+from skillframe.campaign import name_of, parse_axis
 from skillframe.errors import InputError
-from skillframe.execution.result import WORDS, peak_forces
+from skillframe.execution import WORDS, peak_forces
 from skillframe_reports.learned import described
 from skillframe_reports.markup import Markup, join, number, percent, tag
 from skillframe_reports.quantities import quantity

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from skillframe.errors import SkillframeError
-from skillframe.extend.registry import registry
+from skillframe.extend import registry
 from skillframe_reports.markup import Markup, escape, image, join, note, number, table, tag
 from skillframe_reports.sources import Chapter
 

@@ -12,8 +12,8 @@ import re
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from skillframe.campaign.spec import DURATION_S
-from skillframe.execution.result import DEFINED, ESTIMATE, MEAN, PEAK
+from skillframe.campaign import DURATION_S
+from skillframe.execution import DEFINED, ESTIMATE, MEAN, PEAK
 from skillframe_reports.markup import Markup, join, note, number, percent, table, tag
 from skillframe_reports.results import ResultRow, Results
 from skillframe_reports.setup_section import setup_of, table_of

@@ -9,11 +9,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from skillframe.errors import InputError
-from skillframe.execution.trace import Trace
-from skillframe.extend.records import Explanation, Moment, Segmentation
+from skillframe.execution import Trace
+from skillframe.extend import Explanation, Moment, Segmentation
 from skillframe.files import write_whole
 from skillframe.frames import Pose, matrix_from_quaternion
-from skillframe.world.scene import Scene
+from skillframe.world import Scene
 from skillframe_reports import cuts
 from skillframe_reports.learned import labelled
 from skillframe_reports.markup import Markup, data_uri, tag
@@ -121,7 +121,7 @@ def boundaries(cut: Segmentation, out: Path, progress: Progress) -> str:
 
 def scene_file(scene: Scene, out: Path, progress: Progress) -> str:
     """Write a picture of a scene cut open, with its tool where runs start."""
-    from skillframe.execution.recorder import geom_json  # needs MuJoCo, which the other kinds do without
+    from skillframe.execution import geom_json  # needs MuJoCo, which the other kinds do without
 
     tip = Pose(np.array(scene.start_tip), matrix_from_quaternion(scene.start_quaternion))
     sprung = (geom for part in scene.sprung for geom in part.geoms)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from skillframe.errors import InputError
-from skillframe.extend.registry import registry
+from skillframe.extend import registry
 from skillframe.files import write_whole
 from skillframe_reports.headline import lead, tiles
 from skillframe_reports.learned import learned_section

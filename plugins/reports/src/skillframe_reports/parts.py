@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from skillframe.errors import SkillframeError
-from skillframe.extend.records import Grid, Illustration, ReportFiles, SectionType, part_problem
-from skillframe.extend.registry import registry
+from skillframe.extend import Grid, Illustration, ReportFiles, SectionType, part_problem, registry
 from skillframe_reports.markup import Markup, image, join, note, number, table, tag
 
 MOST_BYTES = 2_000_000

@@ -11,10 +11,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.execution.result import force_source
-from skillframe.execution.trace import Trace
-from skillframe.extend.records import Curve
-from skillframe.extend.registry import registry
+from skillframe.execution import Trace, force_source
+from skillframe.extend import Curve, registry
 from skillframe.frames import Float, matrix_from_quaternion, norm, rotation_vector
 from skillframe_reports.markup import Markup, figure, join, tag
 from skillframe_reports.svg import LEFT, Axes, envelope, legend, padded, picture, text

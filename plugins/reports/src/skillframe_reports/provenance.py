@@ -6,7 +6,7 @@ import shlex
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from skillframe.campaign.provenance import CODE
+from skillframe.campaign import CODE
 from skillframe_reports.learned import flat, value_text
 from skillframe_reports.markup import Markup, join, number, table, tag
 from skillframe_reports.quantities import quantity

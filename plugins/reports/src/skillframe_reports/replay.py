@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.execution.trace import Trace
+from skillframe.execution import Trace
 from skillframe.frames import Float, continuous, norm
 from skillframe_reports.markup import Markup, tag
 from skillframe_reports.shapes import Mesh

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from skillframe.campaign.rows import (
+from skillframe.campaign import (
     JUDGED,
     LEFT_OUT,
     OUTCOME,
@@ -24,14 +24,21 @@ from skillframe.campaign.rows import (
     SECOND,
     SOURCE,
     TRUTH,
+    Basis,
+    Interval,
+    Plan,
+    Validity,
     cause_of,
+    correction,
+    holm,
     is_torn,
     is_trial,
     real_or_simulated,
+    unbroken,
+    validity_of,
 )
-from skillframe.campaign.statistics import Basis, Interval, Plan, Validity, correction, holm, unbroken, validity_of
 from skillframe.errors import InputError
-from skillframe.execution.result import SHARE_JOINTS
+from skillframe.execution import SHARE_JOINTS
 from skillframe_reports.markup import percent
 
 REQUIRED = ("trial", "skill", "success")

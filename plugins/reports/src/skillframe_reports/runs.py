@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from skillframe.execution.result import joint_shares, peak_forces, second_parts
+from skillframe.execution import joint_shares, peak_forces, second_parts
 from skillframe_reports.demonstration_curves import axis, lanes_of
 from skillframe_reports.markup import Markup, data_uri, figure, join, json_script, note, number, table, tag
 from skillframe_reports.plots import DOUBT_CAPTION, doubted, drive_plots, events_of, run_plots

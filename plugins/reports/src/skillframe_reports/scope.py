@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from skillframe.campaign.sampling import Axis, parse_axis
-from skillframe.campaign.spec import flatten
+from skillframe.campaign import Axis, flatten, parse_axis
 from skillframe.errors import InputError
 from skillframe_reports.headline import ranges
 from skillframe_reports.learned import flat

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from statistics import median
 from typing import Any
 
-from skillframe.campaign.rows import SCORE
+from skillframe.campaign import SCORE
 from skillframe_reports.markup import Markup, join, number, table, tag
 from skillframe_reports.results import Results
 from skillframe_reports.sources import Chapter

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
-from skillframe.campaign.spec import name_of
+from skillframe.campaign import name_of
 from skillframe_reports.markup import number
 from skillframe_reports.quantities import quantity
 from skillframe_reports.sources import Chapter

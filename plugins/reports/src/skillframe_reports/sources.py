@@ -14,17 +14,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from skillframe.campaign.partial_results import live_table
-from skillframe.campaign.provenance import edited_results
-from skillframe.campaign.sampling import parse_axis
-from skillframe.campaign.spec import flatten, name_of
-from skillframe.campaign.statistics import Plan, plan_of
+from skillframe.campaign import Plan, edited_results, flatten, live_table, name_of, parse_axis, plan_of
 from skillframe.config import read_toml
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import Demonstration
 from skillframe.errors import InputError, SkillframeError
-from skillframe.execution.trace import Trace
-from skillframe.extend.records import FolderType, ReportFiles
-from skillframe.extend.registry import registry
+from skillframe.execution import Trace
+from skillframe.extend import FolderType, ReportFiles, registry
 from skillframe.files.documents import read_json, read_text
 from skillframe_reports.parts import MadeSection, files_of, has_sections, made_sections
 from skillframe_reports.results import Results, read_results

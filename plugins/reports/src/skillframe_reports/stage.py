@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from skillframe.execution.trace import Trace
+from skillframe.execution import Trace
 from skillframe.frames import Float, matrix_from_quaternion, norm, rotate, unit
 from skillframe_reports.shapes import Mesh, merge, mesh_of, section
 

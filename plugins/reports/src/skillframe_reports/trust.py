@@ -8,8 +8,8 @@ from statistics import median_low
 
 import numpy as np
 
-from skillframe.campaign.statistics import Basis
-from skillframe.execution.result import DEFINED, PEAK, SHARE_JOINTS, SHARES, WORDS, peak_forces
+from skillframe.campaign import Basis
+from skillframe.execution import DEFINED, PEAK, SHARE_JOINTS, SHARES, WORDS, peak_forces
 from skillframe_reports.convergence import cell_map, influence
 from skillframe_reports.markup import Markup, figure, join, note, number, percent, table, tag
 from skillframe_reports.quantities import quantity

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from statistics import median
 
-from skillframe.campaign.statistics import nearest_to_median
-from skillframe.execution.trace import Trace
+from skillframe.campaign import nearest_to_median
+from skillframe.execution import Trace
 from skillframe_reports.markup import number
 from skillframe_reports.results import ResultRow, Results
 

@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from typing import NamedTuple
 
-from skillframe.campaign.statistics import Verdict, verdict_of
+from skillframe.campaign import Verdict, verdict_of
 from skillframe_reports.margins import margins_table
 from skillframe_reports.markup import Markup, join, note, percent, tag
 from skillframe_reports.results import Rate, Results

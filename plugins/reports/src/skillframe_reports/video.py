@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.errors import InputError, need
-from skillframe.execution.trace import Trace
+from skillframe.execution import Trace
 from skillframe.files import writing_whole
 from skillframe.frames import Float, norm
 from skillframe_reports import opengl

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from skillframe.campaign.partial_results import has_ended, runs_now
+from skillframe.campaign import has_ended, runs_now
 from skillframe_reports.page import write_chapters
 from skillframe_reports.sources import campaign_folders, read_chapters
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.campaign.statistics import Basis, holm
+from skillframe.campaign import Basis, holm
 from skillframe.frames import Float
 from skillframe_reports.convergence import CURVE_BINS, TRIALS_PER_CELL, edges_of, influence, rate_curves, values_of
 from skillframe_reports.markup import Markup, figure, join, note, number, tag

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import Demonstration
 from skillframe.errors import InputError
 from skillframe.frames import Float, cross, move_wrench, norm, rotate, rotate_spatial, rotation_vector, unit
 

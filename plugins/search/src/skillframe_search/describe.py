@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from skillframe.extend.records import Document
+from skillframe.extend import Document
 from skillframe_search.phase import Phase, read_phase
 
 WAYS = {

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from skillframe.demonstration.record import Demonstration
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.demonstration import Demonstration
+from skillframe.extend import Document, LearnOptions
 from skillframe.frames import Float
 
 RATE, SECONDS = 100.0, 20.0
@@ -14,8 +14,8 @@ PUSH, FRICTION = 10.0, 0.2
 
 def example(algorithm: str = "sampling") -> Document:
     """A search document of an algorithm, learned from a synthetic search of a plane."""
-    from skillframe.document.file import learned
-    from skillframe.extend.registry import registry
+    from skillframe.document import learned
+    from skillframe.extend import registry
 
     settings = {"algorithm": algorithm, "speed": 0.015, "time": 4.0}
     return learned(registry().skill("search"), [searching()], LearnOptions(settings=settings))
@@ -42,8 +42,8 @@ def searching(
 
 def seating() -> Document:
     """A seating learned from two synthetic demonstrations of a plug."""
-    from skillframe.document.file import learned
-    from skillframe.extend.registry import registry
+    from skillframe.document import learned
+    from skillframe.extend import registry
 
     return learned(registry().skill("seat"), [seated(0.14), seated(-0.14, 1)], LearnOptions())
 

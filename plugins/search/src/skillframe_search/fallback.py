@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from skillframe.errors import InputError
-from skillframe.extend.records import Document, Stalled
+from skillframe.extend import Document, Stalled
 from skillframe_search.deadband import STIFFEST, Gains, dead_band
 from skillframe_search.learner import learn, plain
 from skillframe_search.phase import Dither, Path, Phase, Push, Stiffness, Stop

@@ -9,10 +9,10 @@ from typing import Any, Literal
 import numpy as np
 
 from skillframe.config import build
-from skillframe.demonstration.record import Demonstration
-from skillframe.document.frame import frame_of
+from skillframe.demonstration import Demonstration
+from skillframe.document import frame_of
 from skillframe.errors import InputError
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend import Document, LearnOptions
 from skillframe.frames import Float, norm
 from skillframe_search import forces
 from skillframe_search.contact import Samples, in_contact, push_direction, samples, surface_axes

@@ -9,7 +9,7 @@ import numpy as np
 
 from skillframe.config import build
 from skillframe.errors import InputError
-from skillframe.extend.records import Document
+from skillframe.extend import Document
 from skillframe_search.exploration import COORDINATES, Exploration
 from skillframe_search.forces import ForceModel
 

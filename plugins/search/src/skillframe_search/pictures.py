@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 
-from skillframe.extend.records import Document, Illustration
+from skillframe.extend import Document, Illustration
 from skillframe.frames import norm
 from skillframe_search.contact import surface_axes
 from skillframe_search.describe import NAMES

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.extend.records import Document
+from skillframe.extend import Document
 from skillframe.frames import Float, norm
 from skillframe_search.contact import surface_axes
 from skillframe_search.ergodic import ergodic

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.document.frame import read_frame
-from skillframe.extend.records import Document
+from skillframe.document import read_frame
+from skillframe.extend import Document
 from skillframe.frames import Float, Pose, cross, dot, move_wrench, rotate, rotate_spatial, rotation_matrix
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons, rows_of
 from skillframe_search.phase import Phase, Push, Stop, read_phase

@@ -30,9 +30,8 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.document.frame import read_frame
-from skillframe.extend.records import Document
-from skillframe.extend.registry import registry
+from skillframe.document import read_frame
+from skillframe.extend import Document, registry
 from skillframe.frames import Float, Pose, dot, norm, rotate, rotation_matrix, rotation_vector
 from skillframe.sequence import END, Composition, Part, seen_from, told_from
 from skillframe.skill import Command, Observation, Skill, Status, rows_of

@@ -9,10 +9,9 @@ from typing import Any, Literal
 import numpy as np
 
 from skillframe.config import build
-from skillframe.document.frame import read_frame, with_center
+from skillframe.document import read_frame, with_center
 from skillframe.errors import InputError
-from skillframe.extend.records import Document
-from skillframe.extend.registry import registry
+from skillframe.extend import Document, registry
 
 Vector = tuple[float, float, float]
 PUSH, SEARCH = 0, 1

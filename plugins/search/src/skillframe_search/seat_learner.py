@@ -27,13 +27,10 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from skillframe.config import build
-from skillframe.demonstration.contact import contact_evidence
-from skillframe.demonstration.record import Demonstration, resolve_point
-from skillframe.document.frame import common_frames, with_center
+from skillframe.demonstration import Demonstration, contact_evidence, resolve_point
+from skillframe.document import common_frames, with_center
 from skillframe.errors import InputError
-from skillframe.extend.reading import read_demonstration
-from skillframe.extend.records import Document, LearnOptions, SkillType, Stalled
-from skillframe.extend.registry import registry
+from skillframe.extend import Document, LearnOptions, SkillType, Stalled, read_demonstration, registry
 from skillframe.frames import Float, Pose, cross, norm, rotation_vector, unit
 from skillframe_search.learner import plain
 from skillframe_search.seat_document import Seat, as_phase

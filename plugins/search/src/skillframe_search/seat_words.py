@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from math import degrees, radians
 
-from skillframe.extend.records import Document, Illustration
-from skillframe.extend.registry import registry
+from skillframe.extend import Document, Illustration, registry
 from skillframe_search.handling import HANDLING as HOW
 from skillframe_search.seat_document import PUSH, SEARCH, Seat, part_of, read_seat
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.extend.records import Document
+from skillframe.extend import Document
 from skillframe.frames import Float
 
 PUSH_N, STIFF_N_M, SPEED_M_S = 12.0, 1500.0, 0.02

@@ -12,16 +12,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from skillframe_teaching.blind import CUT, BlindSettings, record_blind
 
-from skillframe.demonstration.record import Demonstration
-from skillframe.document.file import learned
-from skillframe.execution.executor import simulate
-from skillframe.execution.prepare import load_robot_model, load_world, prepare
-from skillframe.execution.result import Result
-from skillframe.extend.records import Document, LearnOptions
-from skillframe.extend.registry import registry
+from skillframe.demonstration import Demonstration
+from skillframe.document import learned
+from skillframe.execution import Result, load_robot_model, load_world, prepare, simulate
+from skillframe.extend import Document, LearnOptions, registry
 from skillframe.frames import Float
-from skillframe.robot.model import RobotModel
-from skillframe.world.scene import Scene
+from skillframe.robot import RobotModel
+from skillframe.world import Scene
 
 FOUND_M = 0.0025
 NEAR_M, NEAR_RAD = 0.0015, 0.06  # a part set down this near falls in by itself

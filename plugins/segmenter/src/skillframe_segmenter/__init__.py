@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from functools import partial
 
 from skillframe import hookimpl
-from skillframe.extend.records import Lazy, SegmenterType, SkillType
+from skillframe.extend import Lazy, SegmenterType, SkillType
 
 skillframe_contract = "0.2"
 

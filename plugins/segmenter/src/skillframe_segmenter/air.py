@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.demonstration.record import Demonstration
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.demonstration import Demonstration
+from skillframe.extend import Document, LearnOptions
 from skillframe.frames import unit
 
 CORRELATION_M = 0.015  # of a person's wandering: 30 mm/s for 0.5 s

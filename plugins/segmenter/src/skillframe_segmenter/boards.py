@@ -11,10 +11,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from skillframe.demonstration.record import Demonstration
-from skillframe.document.frame import PLACES, as_plain, frame_of, places_of, seen_from
+from skillframe.demonstration import Demonstration
+from skillframe.document import PLACES, as_plain, frame_of, places_of, seen_from
 from skillframe.errors import InputError
-from skillframe.extend.records import Document, LearnOptions
+from skillframe.extend import Document, LearnOptions
 from skillframe.frames import Pose, norm
 from skillframe_segmenter.boundaries import OPTION
 from skillframe_segmenter.visits import BASE, Visit, index_at, path_of, visits_of

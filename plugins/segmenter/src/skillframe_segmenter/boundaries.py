@@ -9,7 +9,7 @@ from pathlib import PurePath
 from typing import NamedTuple
 
 from skillframe.errors import InputError, UnknownName
-from skillframe.extend.records import Document
+from skillframe.extend import Document
 from skillframe_segmenter.settings import PHASE_MIN_S
 
 OPTION = "--set-boundary"

@@ -9,10 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from skillframe.demonstration.contact import contact_evidence
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import Demonstration, contact_evidence
 from skillframe.errors import InputError
-from skillframe.extend.records import Document
+from skillframe.extend import Document
 from skillframe_segmenter.agreement import check_agreement
 from skillframe_segmenter.explained import CERTAIN, MANY, explained
 from skillframe_segmenter.settings import PHASE_MIN_S

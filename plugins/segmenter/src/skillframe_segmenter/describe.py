@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
-from skillframe.extend.records import Document, Illustration
-from skillframe.extend.registry import registry
+from skillframe.extend import Document, Illustration, registry
 from skillframe_segmenter.document import read
 from skillframe_segmenter.drawing import svg
 from skillframe_segmenter.explained import words as explained_words

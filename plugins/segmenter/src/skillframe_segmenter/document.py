@@ -10,8 +10,7 @@ import numpy as np
 
 from skillframe.config import coerce
 from skillframe.errors import InputError
-from skillframe.extend.records import Document
-from skillframe.extend.registry import registry
+from skillframe.extend import Document, registry
 from skillframe.frames import Float
 from skillframe_segmenter.model import PhaseModel, from_document
 from skillframe_segmenter.placed import is_placed, learned_of, placement_of

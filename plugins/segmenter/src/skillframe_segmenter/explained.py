@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.contact import contact_evidence
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import Demonstration, contact_evidence
 from skillframe.frames import Float
 from skillframe_segmenter.features import features, scales
 from skillframe_segmenter.settings import WINDOW_S

@@ -17,10 +17,9 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import Demonstration
 from skillframe.errors import InputError
-from skillframe.extend.records import Document, LearnOptions
-from skillframe.extend.registry import registry
+from skillframe.extend import Document, LearnOptions, registry
 from skillframe.frames import norm
 from skillframe_segmenter.agreement import check_agreement
 from skillframe_segmenter.air import Learner, learned_in_air

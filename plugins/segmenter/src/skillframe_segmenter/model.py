@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from skillframe.config import coerce
 from skillframe.errors import InputError
-from skillframe.extend.records import Document
+from skillframe.extend import Document
 from skillframe.frames import Float
 from skillframe_segmenter.emission import DIMENSIONS, Phases
 from skillframe_segmenter.features import Scales

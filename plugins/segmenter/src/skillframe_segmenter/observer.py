@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import Demonstration
 from skillframe.frames import Float, Pose, move_wrench, norm, rotate
 from skillframe.skill import Observation
 from skillframe_segmenter import emission, gate, transitions

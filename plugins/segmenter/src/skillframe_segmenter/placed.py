@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from skillframe.config import coerce
-from skillframe.document.frame import PLACES, read_frame, read_places
+from skillframe.document import PLACES, read_frame, read_places
 from skillframe.errors import InputError
-from skillframe.extend.records import Document
+from skillframe.extend import Document
 from skillframe.frames import Pose
 from skillframe.sequence import END, Composition, Part
 from skillframe.skill import Skill, Status

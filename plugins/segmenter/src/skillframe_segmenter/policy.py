@@ -17,9 +17,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from skillframe.document.frame import read_frame
-from skillframe.extend.records import Document
-from skillframe.extend.registry import registry
+from skillframe.document import read_frame
+from skillframe.extend import Document, registry
 from skillframe.frames import Float
 from skillframe.sequence import END, Composition, Moved, Part
 from skillframe.skill import Command, Observation, Skill, Status

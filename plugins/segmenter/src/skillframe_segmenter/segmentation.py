@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.config import build
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import Demonstration
 from skillframe.errors import InputError
-from skillframe.extend.records import Document
+from skillframe.extend import Document
 from skillframe.frames import Float, norm, rotation_vector
 from skillframe_segmenter import changepoints, em, gate, merge, model, pose_gate, runs
 from skillframe_segmenter.boundaries import OPTION

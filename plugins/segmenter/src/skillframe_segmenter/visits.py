@@ -21,9 +21,8 @@ from typing import NamedTuple, NoReturn
 
 import numpy as np
 
-from skillframe.demonstration.contact import contact_evidence
-from skillframe.demonstration.record import Demonstration
-from skillframe.document.frame import places_of
+from skillframe.demonstration import Demonstration, contact_evidence
+from skillframe.document import places_of
 from skillframe.errors import InputError
 from skillframe.frames import Float, Pose, norm, unit
 

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.record import Demonstration, resolve_point
-from skillframe.document.frame import common_frames
+from skillframe.demonstration import Demonstration, resolve_point
+from skillframe.document import common_frames
 from skillframe.errors import InputError
 from skillframe.frames import (
     Float,

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.config import build
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import Demonstration
 from skillframe.errors import InputError
-from skillframe.extend.records import Document
+from skillframe.extend import Document
 from skillframe.frames import Float, norm
 from skillframe_segmenter import runs
 from skillframe_segmenter.features import typical_speeds

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from skillframe import hookimpl
-from skillframe.extend.records import Lazy, TeacherType
+from skillframe.extend import Lazy, TeacherType
 
 skillframe_contract = "0.2"
 

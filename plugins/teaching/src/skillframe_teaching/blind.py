@@ -24,16 +24,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import Demonstration
 from skillframe.errors import InputError, SkillframeError
-from skillframe.execution.executor import Result, Setup, simulate
-from skillframe.extend.reading import Recording
+from skillframe.execution import Result, Setup, simulate
+from skillframe.extend import Recording
 from skillframe.frames import Float, Pose, cross, norm, rotation_matrix, unit
-from skillframe.robot.link_checks import guess_note
-from skillframe.robot.model import RobotModel
+from skillframe.robot import RobotModel, guess_note
 from skillframe.skill import Command, Impedance, Observation, Reasons, Skill, Status, no_reasons
-from skillframe.world.quantities import SensorSettings
-from skillframe.world.scene import Scene, Vector
+from skillframe.world import Scene, SensorSettings, Vector
 from skillframe_teaching.sessions import (
     MOST_ATTEMPTS,
     Watch,

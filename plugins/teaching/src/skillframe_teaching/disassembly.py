@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.errors import InputError
-from skillframe.extend.reading import Recording
+from skillframe.extend import Recording
 from skillframe.frames import Float
-from skillframe.robot.model import RobotModel
-from skillframe.world.scene import Scene, State
+from skillframe.robot import RobotModel
+from skillframe.world import Scene, State
 from skillframe_teaching import sessions
 from skillframe_teaching.teacher import TeacherSettings
 

@@ -18,7 +18,7 @@ import numpy as np
 from skillframe.errors import InputError
 from skillframe.frames import Float, Pose, cross, norm, rotate
 from skillframe.skill import Command, Observation
-from skillframe.world.scene import Scene
+from skillframe.world import Scene
 from skillframe_teaching.teacher import Hand, Teacher, TeacherSettings
 
 FULL_M, AHEAD_S, URGE_N = 0.003, 0.03, 10.0

@@ -16,7 +16,7 @@ import numpy as np
 
 from skillframe.frames import Float, Pose, cross, norm, rotate, unit
 from skillframe.skill import Observation
-from skillframe.world.scene import Task, Vector
+from skillframe.world import Task, Vector
 from skillframe_teaching.teacher import AIM_TIME, Teacher, TeacherSettings
 
 PERIOD_S, OFF_S = 2.0, 0.6  # period of hesitation, and its part without the hand

@@ -14,21 +14,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.convention import STANDARD
-from skillframe.demonstration.record import Demonstration
-from skillframe.document.frame import PLACES, as_plain
+from skillframe.demonstration import STANDARD, Demonstration
+from skillframe.document import PLACES, as_plain
 from skillframe.errors import InputError, SkillframeError
-from skillframe.execution.executor import Result, Setup, require_starts, simulate
-from skillframe.execution.trace import Trace
-from skillframe.extend.reading import Recording
+from skillframe.execution import Result, Setup, Trace, require_starts, simulate
+from skillframe.extend import Recording
 from skillframe.frames import Float, Pose, matrix_from_quaternion, move_wrench, rotate
 from skillframe.handover import SLOW_TICKS
-from skillframe.robot.link_checks import guess_note
-from skillframe.robot.model import RobotModel
+from skillframe.robot import RobotModel, guess_note
 from skillframe.skill import Ended, Skill
-from skillframe.world.placement import fixture_poses, places_in_base
-from skillframe.world.quantities import SensorSettings
-from skillframe.world.scene import Scene, State, Task
+from skillframe.world import Scene, SensorSettings, State, Task, fixture_poses, places_in_base
 from skillframe_teaching.eyes import SeeingTeacher
 from skillframe_teaching.staged import hand_of, teacher_for
 from skillframe_teaching.teacher import TeacherSettings

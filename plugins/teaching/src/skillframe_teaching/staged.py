@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from skillframe.frames import Float, Pose, move_wrench, rotate, rotate_spatial
 from skillframe.skill import Command, Impedance, Observation, Skill, no_reasons, rows_of
-from skillframe.world.scene import REACTION_S, Scene, State, Task
+from skillframe.world import REACTION_S, Scene, State, Task
 from skillframe_teaching.teacher import HANDS, Hand, Teacher, TeacherSettings, firm
 
 

@@ -25,7 +25,7 @@ from skillframe.errors import InputError, UnknownName
 from skillframe.frames import Float, Pose, matrix_from_quaternion, norm, rotate, rotation_matrix, rotation_vector, unit
 from skillframe.signals import require_delay
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
-from skillframe.world.scene import Task
+from skillframe.world import Task
 
 AIM_TIME, TREMOR_TIME = 0.5, 0.1  # correlation times of aim and tremor [s]
 SLOWING_S = 0.2  # a carrying hand decelerates over this time before its goal

@@ -4,7 +4,7 @@
 `skillframe_testkit.template` writes a new plug-in.
 """
 
-from skillframe.extend.commands import LazyCommand
+from skillframe.extend import LazyCommand
 
 skillframe_contract = "0.2"
 

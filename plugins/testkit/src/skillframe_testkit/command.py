@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from skillframe.cli.output import emit_json, note
+from skillframe.cli import emit_json, note
 from skillframe.errors import UnknownName
 from skillframe_testkit.template import EVERY, KINDS
 
@@ -54,7 +54,7 @@ def check(names: tuple[str, ...], as_json: bool) -> int:
       skillframe plugins check
       skillframe plugins check my_skill --json
     """
-    from skillframe.extend.registry import registry
+    from skillframe.extend import registry
     from skillframe_testkit.checks import check_plugin
 
     known = registry()

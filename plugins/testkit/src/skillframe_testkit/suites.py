@@ -19,10 +19,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from skillframe.demonstration.record import Demonstration
-from skillframe.execution.trace import Trace
-from skillframe.extend.records import Document, SkillType
-from skillframe.extend.registry import registry
+from skillframe.demonstration import Demonstration
+from skillframe.execution import Trace
+from skillframe.extend import Document, SkillType, registry
 from skillframe.frames import Float, Pose
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
 from skillframe_testkit.checks import running, skills
@@ -75,7 +74,7 @@ class SkillConformance:
         return record
 
     def _document(self) -> Document:
-        from skillframe.document.file import learned
+        from skillframe.document import learned
 
         if self.document is not None:
             return self.document

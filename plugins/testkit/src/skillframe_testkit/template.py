@@ -13,7 +13,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 from skillframe.errors import InputError
-from skillframe.extend.contract import CONTRACT
+from skillframe.extend import CONTRACT
 from skillframe.files import write_whole
 
 TEMPLATE = Path(__file__).resolve().parent / "plugin_template"

@@ -27,17 +27,23 @@ from skillframe_lmc.phase import Part, Phase, read_phase, speed
 from skillframe_lmc.runtime import PUSHING
 from skillframe_lmc.stall import SMOOTHING_S
 
-from skillframe.control.admittance import CALMING, MASS, MEMORY, QUIET_FORCE, QUIET_TORQUE, SHARE, SLOW
-from skillframe.control.impedance import critical_damping
-from skillframe.control.joint_steps import LEASH_SLACK
-from skillframe.document.frame import read_frame
+from skillframe.control import (
+    CALMING,
+    LEASH_SLACK,
+    MASS,
+    MEMORY,
+    QUIET_FORCE,
+    QUIET_TORQUE,
+    SHARE,
+    SLOW,
+    critical_damping,
+)
+from skillframe.document import read_frame
 from skillframe.errors import InputError
-from skillframe.execution.executor import RAMP_S
-from skillframe.execution.prepare import load_robot_model
-from skillframe.extend.records import Document
+from skillframe.execution import RAMP_S, load_robot_model
+from skillframe.extend import Document
 from skillframe.frames import Float, norm
-from skillframe.robot.model import RobotModel
-from skillframe.robot.spec import RobotSpec
+from skillframe.robot import RobotModel, RobotSpec
 from skillframe.signals import WrenchFilter
 from skillframe_ur.link import GAIN, LOOKAHEAD_S, RATE_HZ, STOP_RAD_S2
 

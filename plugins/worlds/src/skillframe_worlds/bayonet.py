@@ -21,8 +21,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float, norm, quaternion_from_matrix, rotate, rotation_matrix
-from skillframe.world.scene import Geom, Scene, State, Task
-from skillframe.world.shapes import FIXTURE_COLOUR, TOOL_COLOUR, WRIST_TO_TIP, quaternion_about, require, shaft, tool
+from skillframe.world import (
+    FIXTURE_COLOUR,
+    TOOL_COLOUR,
+    WRIST_TO_TIP,
+    Geom,
+    Scene,
+    State,
+    Task,
+    quaternion_about,
+    require,
+    shaft,
+    tool,
+)
 from skillframe_worlds.turned import turned
 
 

@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float, norm
-from skillframe.world.scene import Geom, Scene, State, Task
-from skillframe.world.shapes import FIXTURE_COLOUR, TOOL_COLOUR, TOOL_DOWN, require, shaft, tool
+from skillframe.world import FIXTURE_COLOUR, TOOL_COLOUR, TOOL_DOWN, Geom, Scene, State, Task, require, shaft, tool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,8 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float
-from skillframe.world.scene import Geom, Scene, State, Task
-from skillframe.world.shapes import FIXTURE_COLOUR, FLOOR, TOOL_COLOUR, WRIST_TO_TIP, quaternion_about, require, tool
+from skillframe.world import (
+    FIXTURE_COLOUR,
+    FLOOR,
+    TOOL_COLOUR,
+    WRIST_TO_TIP,
+    Geom,
+    Scene,
+    State,
+    Task,
+    quaternion_about,
+    require,
+    tool,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

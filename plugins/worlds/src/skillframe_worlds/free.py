@@ -7,8 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.world.scene import Geom, Scene, State, Task
-from skillframe.world.shapes import TOOL_COLOUR, TOOL_DOWN, WRIST_TO_TIP, anywhere, no_error, shaft, tool
+from skillframe.world import (
+    TOOL_COLOUR,
+    TOOL_DOWN,
+    WRIST_TO_TIP,
+    Geom,
+    Scene,
+    State,
+    Task,
+    anywhere,
+    no_error,
+    shaft,
+    tool,
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from skillframe.frames import Float, norm
-from skillframe.world.scene import Geom, Scene, State, Task
-from skillframe.world.shapes import TOOL_COLOUR, TOOL_DOWN, WRIST_TO_TIP, require, shaft, slope, tool
+from skillframe.world import TOOL_COLOUR, TOOL_DOWN, WRIST_TO_TIP, Geom, Scene, State, Task, require, shaft, slope, tool
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from skillframe import hookimpl
-from skillframe.extend.records import WorldType
-from skillframe.world.scene import Scene
+from skillframe.extend import WorldType
+from skillframe.world import Scene
 from skillframe_worlds import (
     bayonet,
     corner,

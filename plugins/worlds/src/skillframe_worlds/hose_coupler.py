@@ -13,11 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float, norm
-from skillframe.world.scene import Geom, Scene, State, Task, Vector
-from skillframe.world.shapes import (
+from skillframe.world import (
     FIXTURE_COLOUR,
     TOOL_COLOUR,
     TOOL_DOWN,
+    Geom,
+    Scene,
+    State,
+    Task,
+    Vector,
     filleted_peg,
     quaternion_about,
     require,

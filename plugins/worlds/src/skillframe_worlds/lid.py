@@ -19,12 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float, matrix_from_quaternion
-from skillframe.world.scene import Geom, Mover, Scene, State, Task
-from skillframe.world.shapes import (
+from skillframe.world import (
     FIXTURE_COLOUR,
     TOOL_COLOUR,
     TOOL_DOWN,
     WRIST_TO_TIP,
+    Geom,
+    Mover,
+    Scene,
+    State,
+    Task,
     quaternion_about,
     require,
     shaft,

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float, norm
-from skillframe.world.scene import Geom, Scene, Sprung, State, Task, Tool, Vector
-from skillframe.world.shapes import TOOL_COLOUR, TOOL_DOWN, require
+from skillframe.world import TOOL_COLOUR, TOOL_DOWN, Geom, Scene, Sprung, State, Task, Tool, Vector, require
 
 RADIUS = 0.05
 LENGTH, WIDTH, STEP = 1.2, 0.8, 0.144

@@ -12,11 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float, norm
-from skillframe.world.scene import Scene, State, Task
-from skillframe.world.shapes import (
+from skillframe.world import (
     FLOOR,
     TOOL_DOWN,
     WRIST_TO_TIP,
+    Scene,
+    State,
+    Task,
     filleted_peg,
     hole,
     insertion,

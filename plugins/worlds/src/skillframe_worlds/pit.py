@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float, unit
-from skillframe.world.scene import Geom, Scene, State, Task
-from skillframe.world.shapes import TOOL_COLOUR, TOOL_DOWN, WRIST_TO_TIP, require, shaft, slope, tool
+from skillframe.world import TOOL_COLOUR, TOOL_DOWN, WRIST_TO_TIP, Geom, Scene, State, Task, require, shaft, slope, tool
 from skillframe_worlds.turned import as_vector, turned
 
 

@@ -12,13 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float, norm
-from skillframe.world.scene import Geom, Scene, State, Task
-from skillframe.world.shapes import (
+from skillframe.world import (
     FIXTURE_COLOUR,
     FLOOR,
     TOOL_COLOUR,
     TOOL_DOWN,
     WRIST_TO_TIP,
+    Geom,
+    Scene,
+    State,
+    Task,
     filleted_peg,
     hole,
     insertion,

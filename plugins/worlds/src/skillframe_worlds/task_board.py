@@ -18,12 +18,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float, Pose, matrix_from_quaternion, norm, quaternion_from_matrix, rotate, rotation_matrix
-from skillframe.world.scene import Geom, Scene, State, Task, Vector
-from skillframe.world.shapes import (
+from skillframe.world import (
     FIXTURE_COLOUR,
     TOOL_COLOUR,
     TOOL_DOWN,
     WRIST_TO_TIP,
+    Geom,
+    Scene,
+    State,
+    Task,
+    Vector,
     hole,
     require,
     shaft,

@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from skillframe.frames import Float, Pose, matrix_from_quaternion, quaternion_from_matrix, rotate, rotation_matrix
-from skillframe.world.scene import Geom, Mover, Scene, Sprung, State, Task, Vector
+from skillframe.world import Geom, Mover, Scene, Sprung, State, Task, Vector
 
 _T = TypeVar("_T")
 

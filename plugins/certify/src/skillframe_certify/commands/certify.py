@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from skillframe.cli.options import COUNT, NATURAL
-from skillframe.cli.output import emit_json, note, terminable
+from skillframe.cli import COUNT, NATURAL, emit_json, note, terminable
 
 if TYPE_CHECKING:
     from skillframe_certify.certificate import Outcome
@@ -112,9 +111,8 @@ def start(
     look: int | None = None, most: int | None = None,
 ) -> None:  # fmt: skip
     """Begin a folder from a campaign file with at most `most` ranges (default: `MOST_MAPPED`)."""
-    from skillframe.campaign import evaluate
-    from skillframe.campaign.spec import CampaignSpec
-    from skillframe.extend.registry import registry
+    from skillframe.campaign import CampaignSpec, evaluate
+    from skillframe.extend import registry
     from skillframe_certify.question import MOST_MAPPED, USUAL, begin
 
     spec = CampaignSpec.from_toml(source)
@@ -144,11 +142,8 @@ def _ask(folder: Path, rate: float | None, confidence: float | None) -> None:
 @contextmanager
 def engine_of(folder: Path, workers: int | None) -> Iterator[Engine]:
     """Provide the engine of a folder's trials and stop its workers at the end."""
-    from skillframe.campaign import evaluate
-    from skillframe.campaign.driver import Keeper
-    from skillframe.campaign.folder import FolderLock, load
-    from skillframe.campaign.runner import WATCH, Options
-    from skillframe.extend.registry import registry
+    from skillframe.campaign import WATCH, FolderLock, Keeper, Options, evaluate, load
+    from skillframe.extend import registry
     from skillframe_certify.engine import Engine
     from skillframe_certify.question import LOOK, read_question
 
@@ -161,7 +156,7 @@ def engine_of(folder: Path, workers: int | None) -> Iterator[Engine]:
 
 def _judged(folder: Path, engine: Engine, again: bool) -> Outcome | None:
     """Run what is missing and return the outcome, or None if no box is worth claiming."""
-    from skillframe.cli.output import campaign_progress
+    from skillframe.cli import campaign_progress
     from skillframe.errors import InputError
     from skillframe_certify import procedure
     from skillframe_certify.certificate import outcome
@@ -190,7 +185,7 @@ def _judged(folder: Path, engine: Engine, again: bool) -> Outcome | None:
 
 
 def _show(found: Outcome | None, said: dict[str, Any]) -> None:
-    from skillframe.campaign.partial_results import said_again
+    from skillframe.campaign import said_again
     from skillframe_certify.binding import SYSTEM
     from skillframe_certify.certificate import CHOSEN
 
@@ -234,7 +229,7 @@ def said_value(name: str, value: float) -> str:
     import re
 
     from skillframe.config.units import shown
-    from skillframe.extend.drives import quantities
+    from skillframe.extend import quantities
 
     unit = quantities()[name].unit if name in quantities() else ""
     return re.sub(r"^-?[\d.]+(e-?\d+)?", lambda found: f"{float(found[0]):.4g}", shown(value, unit))
@@ -261,8 +256,7 @@ def check(folder: Path, replays: int) -> int:
     Example:
       skillframe certify check certified --replays 5
     """
-    from skillframe.campaign import evaluate
-    from skillframe.campaign.runner import replay_trial
+    from skillframe.campaign import evaluate, replay_trial
     from skillframe_certify import procedure
     from skillframe_certify.certificate import CERTIFICATE, check_certificate
     from skillframe_certify.plan import PLAN

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from skillframe.cli.output import emit_json, note, table
+from skillframe.cli import emit_json, note, table
 
 if TYPE_CHECKING:
     from skillframe_certify.compare import Judgement, Pair, Ranked

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from skillframe.cli.options import NATURAL
-from skillframe.cli.output import emit_json, note
+from skillframe.cli import NATURAL, emit_json, note
 
 if TYPE_CHECKING:
     from skillframe_certify.real_trials import Real, RealTable

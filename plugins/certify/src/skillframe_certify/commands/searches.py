@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from skillframe.cli.options import COUNT
-from skillframe.cli.output import emit_json, note, terminable
+from skillframe.cli import COUNT, emit_json, note, terminable
 from skillframe_certify.commands.certify import engine_of, said_value, start
 
 if TYPE_CHECKING:
@@ -113,7 +112,7 @@ def _answer(
 
 
 def _look(folder: Path, engine: Engine) -> None:
-    from skillframe.cli.output import campaign_progress
+    from skillframe.cli import campaign_progress
     from skillframe_certify.procedure import look
     from skillframe_certify.question import LOOK
     from skillframe_certify.rounds import is_complete

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from skillframe.cli.output import bold, is_quiet
+from skillframe.cli import bold, is_quiet
 
 if TYPE_CHECKING:
     from skillframe_certify.task import TaskFile
@@ -71,7 +71,7 @@ def _refuse_other_skill(out: Path) -> None:
     Raises:
         InputError: the skill is not the one that the trials ran.
     """
-    from skillframe.campaign.provenance import file_hash
+    from skillframe.campaign import file_hash
     from skillframe.errors import InputError
     from skillframe_certify.question import LOOK
 

@@ -12,9 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.campaign.provenance import file_hash
-from skillframe.campaign.rows import TRUTH, is_trial
-from skillframe.campaign.store import RESULTS
+from skillframe.campaign import RESULTS, TRUTH, file_hash, is_trial
 from skillframe.errors import InputError, SkillframeError
 from skillframe.files.documents import read_json, read_text
 from skillframe.frames import Float

@@ -19,9 +19,7 @@ from skillframe_reports.sources import Chapter
 from skillframe_reports.theory import regions
 
 import skillframe
-from skillframe.campaign.partial_results import RanAgain, said_again
-from skillframe.campaign.spec import name_of
-from skillframe.campaign.statistics import clopper_pearson
+from skillframe.campaign import RanAgain, clopper_pearson, name_of, said_again
 from skillframe_certify.binding import SYSTEM
 from skillframe_certify.certificate import CHOSEN
 from skillframe_certify.report.answers import Asked

@@ -5,11 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from skillframe.errors import InputError, SkillframeError
-from skillframe.extend.drives import unmapped_warnings
-from skillframe.robot.chain import ClosedChain
-from skillframe.robot.link_checks import Problem, cannot_run, warning
-from skillframe.robot.model import RobotModel
-from skillframe.robot.spec import Limits
+from skillframe.extend import unmapped_warnings
+from skillframe.robot import ClosedChain, Limits, Problem, RobotModel, cannot_run, warning
 from skillframe_hydraulics.checks.feasibility import problems, short_struts
 from skillframe_hydraulics.checks.figures import (
     CYLINDER,

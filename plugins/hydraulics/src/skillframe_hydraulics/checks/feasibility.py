@@ -17,8 +17,7 @@ import pinocchio as pin
 
 from skillframe.errors import InputError
 from skillframe.frames import Float, norm
-from skillframe.robot.chain import MISFIT, ClosedChain, OutOfReach
-from skillframe.robot.tables import Actuation
+from skillframe.robot import MISFIT, Actuation, ClosedChain, OutOfReach
 from skillframe_hydraulics.checks.figures import CYLINDER, is_motor, needed, relief, require_known
 from skillframe_hydraulics.checks.figures import areas as chamber_areas
 

@@ -16,10 +16,7 @@ from typing import Any, NamedTuple
 from skillframe.config import read_toml
 from skillframe.errors import InputError, UnknownName
 from skillframe.files import data_dirs
-from skillframe.robot.model import RobotModel
-from skillframe.robot.payload import published_inertia
-from skillframe.robot.spec import Limits
-from skillframe.robot.tables import Actuation
+from skillframe.robot import Actuation, Limits, RobotModel, published_inertia
 from skillframe_hydraulics.checks.plausible import CYLINDER_RULES, MACHINE_RULES, Doubt, doubts
 from skillframe_hydraulics.declared import noise_of
 

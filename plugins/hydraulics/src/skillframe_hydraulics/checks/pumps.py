@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from skillframe.frames import Float
-from skillframe.robot.chain import ClosedChain
+from skillframe.robot import ClosedChain
 from skillframe_hydraulics.checks.figures import Unfit, areas
 from skillframe_hydraulics.declared import supplies_of
 from skillframe_hydraulics.force.calibration import CALIBRATION_S, swing

@@ -10,12 +10,19 @@ from typing import Any
 import numpy as np
 
 from skillframe.errors import InputError
-from skillframe.fmu.actuator import INPUTS, OUTPUTS, Actuators, ActuatorSpec
-from skillframe.fmu.build import cached_path, find_compiler, fmu_folders
-from skillframe.fmu.opening import kept, open_actuators
+from skillframe.fmu import (
+    INPUTS,
+    OUTPUTS,
+    Actuators,
+    ActuatorSpec,
+    cached_path,
+    find_compiler,
+    fmu_folders,
+    kept,
+    open_actuators,
+)
 from skillframe.frames import Float
-from skillframe.robot.spec import RobotSpec
-from skillframe.robot.tables import Actuation
+from skillframe.robot import Actuation, RobotSpec
 from skillframe_hydraulics.checks.figures import CYLINDER, completed
 
 
@@ -55,7 +62,7 @@ def open_cylinders(
     folder = fmu_folders()[CYLINDER]
     named = all(spec.fmu == CYLINDER for spec in specs)
     if named and find_compiler() is None and not cached_path(folder, version).is_file():
-        from skillframe.fmu.table import read_table
+        from skillframe.fmu import read_table
         from skillframe_hydraulics.cylinder.reference import ReferenceBank
 
         return ReferenceBank(specs, read_table(folder), trials)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from skillframe.fmu.actuator import Float
+from skillframe.fmu import Float
 from skillframe_hydraulics.symbolic_or_numeric import (
     absolute,
     clip,

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.errors import InputError, UnknownName
-from skillframe.fmu.actuator import DISCARD, OK, OUTPUTS, ActuatorSpec, Capabilities, columns
-from skillframe.fmu.table import VariableTable, rows
+from skillframe.fmu import DISCARD, OK, OUTPUTS, ActuatorSpec, Capabilities, VariableTable, columns, rows
 from skillframe_hydraulics.cylinder import equations as eq
 from skillframe_hydraulics.cylinder.macro_step import GIVEN, MEMORY, RESULT, SHOWN
 from skillframe_hydraulics.cylinder.routines import Routines

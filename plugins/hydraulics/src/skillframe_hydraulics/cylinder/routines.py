@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.fmu.actuator import Float
+from skillframe.fmu import Float
 from skillframe_hydraulics.cylinder import equations as eq
 from skillframe_hydraulics.cylinder.macro_step import GIVEN, MEMORY, RESULT, SHOWN, STAGE, begin, finish, show, substep
 

@@ -18,7 +18,7 @@ from skillframe_hydraulics.law.generated import Batch
 from skillframe_hydraulics.law.hydraulic import tool_axes
 
 if TYPE_CHECKING:
-    from skillframe.robot.chain import ClosedChain
+    from skillframe.robot import ClosedChain
     from skillframe_hydraulics.law.hydraulic import Measured, Terms
     from skillframe_hydraulics.law.vdc_actuator import Cylinders
 

@@ -17,14 +17,14 @@ import numpy as np
 import pinocchio as pin
 
 from skillframe.frames import Float
-from skillframe.robot.payload import loaded_inertias
+from skillframe.robot import loaded_inertias
 from skillframe_hydraulics.checks.figures import CYLINDER
 from skillframe_hydraulics.force.momentum import joint_force
 from skillframe_hydraulics.law.vdc_body import parameters
 
 if TYPE_CHECKING:
-    from skillframe.robot.chain import ClosedChain
-    from skillframe.world.plant import Draws
+    from skillframe.robot import ClosedChain
+    from skillframe.world import Draws
     from skillframe_hydraulics.law.hydraulic import Measured, Terms
     from skillframe_hydraulics.law.hydraulic_compiled import CompiledLaw
     from skillframe_hydraulics.law.vdc_actuator import Cylinders

@@ -18,7 +18,7 @@ from skillframe.frames import Float
 from skillframe_hydraulics.force.damped import noise_passed
 
 if TYPE_CHECKING:
-    from skillframe.robot.chain import ClosedChain
+    from skillframe.robot import ClosedChain
     from skillframe_hydraulics.declared import MachineNoise
     from skillframe_hydraulics.law.vdc_actuator import Cylinders
 

@@ -20,10 +20,7 @@ import numpy as np
 import pinocchio as pin
 
 from skillframe.frames import Float, norm
-from skillframe.robot.chain import ChainState, ClosedChain
-from skillframe.robot.model import RobotModel, load_model
-from skillframe.robot.payload import with_payload
-from skillframe.robot.spec import RobotSpec
+from skillframe.robot import ChainState, ClosedChain, RobotModel, RobotSpec, load_model, with_payload
 from skillframe_hydraulics.declared import gains_of, noise_of, with_gains
 from skillframe_hydraulics.force.damped import noise_passed
 from skillframe_hydraulics.law.hydraulic import HydraulicGains, tool_task

@@ -16,7 +16,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.fmu.build import build_library
+from skillframe.fmu import build_library
 from skillframe.frames import Float
 
 NOTE = "no C compiler: the control law runs in casadi's interpreter, some 5 times slower; pip install ziglang"

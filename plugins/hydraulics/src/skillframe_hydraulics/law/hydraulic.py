@@ -18,7 +18,7 @@ import numpy as np
 
 from skillframe.errors import InputError
 from skillframe.frames import Float
-from skillframe.robot.chain import ClosedChain
+from skillframe.robot import ClosedChain
 from skillframe_hydraulics.law.vdc_actuator import ContactFriction
 from skillframe_hydraulics.law.vdc_reference import ToolTask, swung_by
 

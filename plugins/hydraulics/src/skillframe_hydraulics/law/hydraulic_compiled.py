@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float
-from skillframe.robot.chain import CLOSED, ClosedChain, OutOfReach
+from skillframe.robot import CLOSED, ClosedChain, OutOfReach
 from skillframe_hydraulics.law.generated import Batch
 from skillframe_hydraulics.law.hydraulic import Demand, HydraulicGains, Measured, Reference, Terms, tool_axes
 from skillframe_hydraulics.law.hydraulic_symbolic import cylinder_table, functions

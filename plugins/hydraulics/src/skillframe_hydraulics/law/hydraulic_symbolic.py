@@ -14,8 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from skillframe.frames import Float
-from skillframe.robot.chain import ClosedChain
-from skillframe.robot.payload import published_inertia
+from skillframe.robot import ClosedChain, published_inertia
 from skillframe.signals import rate_after
 from skillframe_hydraulics.law.generated import dense_function, matrix_symbol
 from skillframe_hydraulics.law.symbolic_chain import Expression, SymbolicChain, closing_function, constant

@@ -18,8 +18,7 @@ import numpy as np
 import pinocchio as pin
 
 from skillframe.frames import Float
-from skillframe.robot.chain import ClosedChain
-from skillframe.robot.loops import ClosedLoop
+from skillframe.robot import ClosedChain, ClosedLoop
 from skillframe_hydraulics.law.generated import dense_function
 
 ROUNDING = 1e-14

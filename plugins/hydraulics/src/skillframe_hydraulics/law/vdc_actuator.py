@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 
 from skillframe.frames import Float
-from skillframe.robot.tables import Actuation
+from skillframe.robot import Actuation
 from skillframe_hydraulics.checks.figures import EDGES, NEEDED, SHAPE, areas, is_motor, require_known
 from skillframe_hydraulics.symbolic_or_numeric import absolute, exp, maximum, sign, sqrt, square_sum, tanh, where
 

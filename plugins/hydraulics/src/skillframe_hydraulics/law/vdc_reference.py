@@ -29,7 +29,7 @@ import numpy as np
 
 from skillframe.errors import InputError
 from skillframe.frames import Float
-from skillframe.robot.chain import ChainState, ClosedChain
+from skillframe.robot import ChainState, ClosedChain
 from skillframe_hydraulics.law.symbolic_chain import Expression, SymbolicChain
 from skillframe_hydraulics.symbolic_or_numeric import maximum, square_sum
 

@@ -13,7 +13,7 @@ from math import cos, pi, sin
 import numpy as np
 from skillframe_search.trials import NOBODY_KNEW, Task, demonstrations, document, goals
 
-from skillframe.extend.records import RowResult, RowRun
+from skillframe.extend import RowResult, RowRun
 from skillframe_papers.bars import together
 from skillframe_papers.rows.harness import Ran, compared, leads
 from skillframe_papers.rows.search import EARLY_S, SHIFT, off_centre, searched

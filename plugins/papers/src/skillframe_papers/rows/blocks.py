@@ -11,14 +11,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.execution.drive import Setup
-from skillframe.execution.executor import simulate
-from skillframe.execution.prepare import prepare
-from skillframe.extend.records import Document
+from skillframe.execution import Setup, prepare, simulate
+from skillframe.extend import Document
 from skillframe.frames import Float, Pose
-from skillframe.robot.model import RobotModel
+from skillframe.robot import RobotModel
 from skillframe.skill import Command, Impedance, Observation, Skill, rows_of
-from skillframe.world.scene import Scene
+from skillframe.world import Scene
 
 
 class Trials(NamedTuple):

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from skillframe.extend.records import RowResult, RowRun
+from skillframe.extend import RowResult, RowRun
 from skillframe_papers.rows.harness import (
     DOWN,
     Ran,

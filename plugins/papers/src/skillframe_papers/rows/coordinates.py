@@ -13,10 +13,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.execution.prepare import load_robot_model
-from skillframe.extend.records import RowResult, RowRun
+from skillframe.execution import load_robot_model
+from skillframe.extend import RowResult, RowRun
 from skillframe.frames import quaternion_from_matrix, rotation_matrix, unit
-from skillframe.robot.model import RobotModel
+from skillframe.robot import RobotModel
 from skillframe_papers.rows.blocks import Trials, ran
 from skillframe_papers.rows.harness import Ran, compared, generators, leads, lmc, seeds, shown, teacher, world
 

@@ -12,13 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.execution.executor import Result
-from skillframe.extend.records import RowResult, RowRun
+from skillframe.execution import Result
+from skillframe.extend import RowResult, RowRun
 from skillframe.frames import Float
-from skillframe.robot.chain import ClosedChain
-from skillframe.robot.model import load_model
-from skillframe.robot.payload import with_payload
-from skillframe.robot.spec import load_robot
+from skillframe.robot import ClosedChain, load_model, load_robot, with_payload
 from skillframe_papers.rows import crane_runs
 
 START = (math.pi / 4, -math.pi / 2, 0.5)

@@ -13,13 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.execution.executor import Result, Setup, simulate
-from skillframe.execution.prepare import load_robot_model
+from skillframe.execution import Result, Setup, load_robot_model, simulate
 from skillframe.frames import Float, Pose
-from skillframe.robot.model import RobotModel
+from skillframe.robot import RobotModel
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons
-from skillframe.world.scene import Geom, Scene, Task, Tool
-from skillframe.world.shapes import anywhere, no_error
+from skillframe.world import Geom, Scene, Task, Tool, anywhere, no_error
 
 Path = Callable[[float], tuple[Float, Float]]
 """Displacement from the start (3,) [m] and its rate at a time [s]."""

@@ -19,14 +19,12 @@ import numpy as np
 from skillframe_hydraulics.sessions import aimed, record_operated
 from skillframe_hydraulics.teleoperation import OperatorSettings
 
-from skillframe.demonstration.record import Demonstration
-from skillframe.document.file import learned
-from skillframe.execution.executor import Result, simulate
-from skillframe.execution.prepare import load_robot_model, load_world, prepare
-from skillframe.extend.records import Document, Illustration, LearnOptions, RowResult, RowRun
-from skillframe.extend.registry import registry
+from skillframe.demonstration import Demonstration
+from skillframe.document import learned
+from skillframe.execution import Result, load_robot_model, load_world, prepare, simulate
+from skillframe.extend import Document, Illustration, LearnOptions, RowResult, RowRun, registry
 from skillframe.frames import Float
-from skillframe.world.placement import nominal_fixture
+from skillframe.world import nominal_fixture
 
 ROBOT, WORLD = "hiab_xs031", "pallets"
 SURFACES = ("wood", "styrofoam")

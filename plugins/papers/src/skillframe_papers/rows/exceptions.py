@@ -14,11 +14,9 @@ from typing import Any
 import numpy as np
 from skillframe_search.trials import Task, demonstrations
 
-from skillframe.demonstration.record import Demonstration
-from skillframe.document.file import learned
-from skillframe.extend.reading import write_demonstration
-from skillframe.extend.records import Document, LearnOptions, RowResult, RowRun
-from skillframe.extend.registry import registry
+from skillframe.demonstration import Demonstration
+from skillframe.document import learned
+from skillframe.extend import Document, LearnOptions, RowResult, RowRun, registry, write_demonstration
 from skillframe.frames import Float
 from skillframe_papers.bars import no_better
 from skillframe_papers.rows.harness import (

@@ -18,7 +18,7 @@ from skillframe_segmenter.observer import drive_of, follow
 from skillframe_segmenter.settings import WINDOW_S
 from skillframe_segmenter.windows import windows
 
-from skillframe.extend.records import Document, RowResult, RowRun
+from skillframe.extend import Document, RowResult, RowRun
 from skillframe.frames import Float
 from skillframe_papers.bars import undecided
 from skillframe_papers.rows.harness import SHARE, Ran, compared, key_of, leads

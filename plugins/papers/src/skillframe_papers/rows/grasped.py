@@ -9,8 +9,8 @@ from __future__ import annotations
 from functools import cache
 from typing import NamedTuple
 
-from skillframe.execution.prepare import load_robot_model, load_world
-from skillframe.extend.records import RowResult, RowRun
+from skillframe.execution import load_robot_model, load_world
+from skillframe.extend import RowResult, RowRun
 from skillframe_papers.rows.insertion import PUBLISHED, Asked, Row, in_the_grasp, largest, raised, side_by_side
 from skillframe_papers.rows.sweep import COARSE, HEIGHTS_M, SECONDS, both, phase_of
 

@@ -16,17 +16,15 @@ from numpy.typing import NDArray
 from skillframe_teaching.sessions import record
 from skillframe_teaching.teacher import TeacherSettings
 
-from skillframe.demonstration.record import Demonstration
-from skillframe.document.file import learned
+from skillframe.demonstration import Demonstration
+from skillframe.document import learned
 from skillframe.errors import InputError
-from skillframe.execution.drive import Setup
-from skillframe.execution.prepare import load_robot_model, load_world, prepare
-from skillframe.extend.records import Document, LearnOptions, RowRun, Verdict
-from skillframe.extend.registry import registry
+from skillframe.execution import Setup, load_robot_model, load_world, prepare
+from skillframe.extend import Document, LearnOptions, RowRun, Verdict, registry
 from skillframe.frames import Float
-from skillframe.robot.model import RobotModel
+from skillframe.robot import RobotModel
 from skillframe.skill import Skill
-from skillframe.world.scene import Scene
+from skillframe.world import Scene
 from skillframe_papers.bars import ahead, counted, judged, level, together
 from skillframe_papers.rows.blocks import Ended, ran_made
 

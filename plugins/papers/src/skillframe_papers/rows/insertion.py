@@ -19,12 +19,10 @@ from skillframe_dualarm.dual_peg import REACH
 from skillframe_dualarm.runtime import DualArm
 
 from skillframe.errors import UnknownName
-from skillframe.execution.executor import Setup, simulate
-from skillframe.execution.result import ArmsResult
+from skillframe.execution import ArmsResult, Setup, simulate
 from skillframe.frames import Float, rotate
-from skillframe.robot.model import RobotModel
-from skillframe.world.placement import nominal_fixture
-from skillframe.world.scene import Scene
+from skillframe.robot import RobotModel
+from skillframe.world import Scene, nominal_fixture
 from skillframe_papers.rows.blocks import Blocks
 
 POSTURES = ("upright", "mirrored")

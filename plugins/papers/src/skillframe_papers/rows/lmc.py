@@ -13,15 +13,12 @@ from typing import Any
 import numpy as np
 from skillframe_teaching.sessions import record
 
-from skillframe.demonstration.record import Demonstration
-from skillframe.document.file import new_document
-from skillframe.document.frame import frame_at
-from skillframe.execution.executor import simulate
-from skillframe.execution.prepare import load_robot_model, load_world, prepare
-from skillframe.extend.records import Document, Illustration, RowResult, RowRun
-from skillframe.extend.registry import registry
+from skillframe.demonstration import Demonstration
+from skillframe.document import frame_at, new_document
+from skillframe.execution import load_robot_model, load_world, prepare, simulate
+from skillframe.extend import Document, Illustration, RowResult, RowRun, registry
 from skillframe.frames import Float
-from skillframe.world.scene import Scene
+from skillframe.world import Scene
 from skillframe_papers.bars import reached
 from skillframe_papers.rows.blocks import ran_made
 from skillframe_papers.rows.harness import Ran, generators, lmc, stiff, teacher, world

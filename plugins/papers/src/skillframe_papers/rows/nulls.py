@@ -12,7 +12,7 @@ import numpy as np
 from skillframe_lmc.intervals import Motion, track, translation
 from skillframe_lmc.settings import Settings
 
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import Demonstration
 from skillframe.frames import Float, norm, unit
 from skillframe_papers.rows.harness import DOWN
 

@@ -10,8 +10,8 @@ import numpy as np
 from skillframe_teaching.sessions import record
 from skillframe_teaching.teacher import TeacherSettings
 
-from skillframe.execution.prepare import load_robot_model
-from skillframe.extend.records import Document, RowResult, RowRun
+from skillframe.execution import load_robot_model
+from skillframe.extend import Document, RowResult, RowRun
 from skillframe_papers.rows.harness import Ran, X, Y, Z, compared, leads, lmc_if_any, one_axis, world
 
 FACTS = ("push within 10 degrees of z", "no direction of turning", "one axis, along x", "one axis of turning, about y")

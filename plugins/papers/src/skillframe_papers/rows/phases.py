@@ -14,9 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from skillframe_teaching.teacher import HANDS
 
-from skillframe.demonstration.record import Demonstration
-from skillframe.extend.records import Document, Illustration, LearnOptions, RowResult, RowRun
-from skillframe.extend.registry import registry
+from skillframe.demonstration import Demonstration
+from skillframe.extend import Document, Illustration, LearnOptions, RowResult, RowRun, registry
 from skillframe.frames import Float, matrix_from_quaternion, rotation_vector
 from skillframe_papers.bars import undecided
 from skillframe_papers.rows.harness import SHARE, Key, Ran, compared, key_of, leads, shown, teacher, world

@@ -18,10 +18,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.extend.records import Document, RowResult, RowRun
+from skillframe.extend import Document, RowResult, RowRun
 from skillframe.frames import Float, rotate
-from skillframe.world.plant import displacement
-from skillframe.world.scene import Scene
+from skillframe.world import Scene, displacement
 from skillframe_papers.rows.harness import (
     DOWN,
     Ran,

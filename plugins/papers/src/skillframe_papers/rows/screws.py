@@ -13,11 +13,11 @@ from math import radians
 import numpy as np
 from skillframe_teaching.teacher import TeacherSettings
 
-from skillframe.campaign.statistics import clopper_pearson
-from skillframe.demonstration.record import Demonstration
+from skillframe.campaign import clopper_pearson
+from skillframe.demonstration import Demonstration
 from skillframe.errors import SkillframeError
-from skillframe.extend.records import Document, RowResult, RowRun
-from skillframe.world.scene import Scene
+from skillframe.extend import Document, RowResult, RowRun
+from skillframe.world import Scene
 from skillframe_papers.rows.harness import (
     HEAD,
     SHARE,

@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from skillframe_search.trials import NOBODY_KNEW, Task, demonstrations, document, goals, share, starts
 
-from skillframe.demonstration.record import Demonstration
-from skillframe.execution.prepare import load_robot_model
-from skillframe.extend.records import Document, Illustration, RowResult, RowRun
+from skillframe.demonstration import Demonstration
+from skillframe.execution import load_robot_model
+from skillframe.extend import Document, Illustration, RowResult, RowRun
 from skillframe.frames import Float
-from skillframe.world.scene import Scene
+from skillframe.world import Scene
 from skillframe_papers.bars import judged, no_better, reached, together
 from skillframe_papers.rows.blocks import Trials, ran
 from skillframe_papers.rows.harness import Key, Ran, compared, generators, key_of, leads, not_behind

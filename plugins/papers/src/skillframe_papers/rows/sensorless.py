@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from skillframe_teaching.teacher import TeacherSettings
 
-from skillframe.execution.prepare import load_world
-from skillframe.extend.records import Document, RowResult, RowRun
+from skillframe.execution import load_world
+from skillframe.extend import Document, RowResult, RowRun
 from skillframe.frames import Float
 from skillframe_papers.rows import nulls
 from skillframe_papers.rows.harness import (

@@ -12,10 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.record import Demonstration
-from skillframe.document.file import new_document
-from skillframe.extend.records import Document, RowResult, RowRun
-from skillframe.extend.registry import registry
+from skillframe.demonstration import Demonstration
+from skillframe.document import new_document
+from skillframe.extend import Document, RowResult, RowRun, registry
 from skillframe_papers.bars import no_better
 from skillframe_papers.rows.harness import (
     HEAD,

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 from skillframe_dualarm.document import Arm, Phase, configured, relative
 
-from skillframe.execution.prepare import load_robot_model, load_world
-from skillframe.extend.records import RowRun
+from skillframe.execution import load_robot_model, load_world
+from skillframe.extend import RowRun
 from skillframe_papers.rows.insertion import POSTURES, Asked, Row, insert, largest, raised, side_by_side, sticking
 
 NAMES = ("A", "B", "C", "D", "E", "E*")

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from skillframe.extend.records import Illustration, RowResult, RowRun
+from skillframe.extend import Illustration, RowResult, RowRun
 from skillframe_papers.rows.insertion import MOTION, PUBLISHED, Arms, Row
 from skillframe_papers.rows.sweep import HEIGHTS_M, Sweep, stuck_in, sweep
 

@@ -22,13 +22,12 @@ from numpy.typing import NDArray
 from skillframe_teaching.sessions import record
 from skillframe_worlds.valley import ValleyParams
 
-from skillframe.demonstration.record import Demonstration
-from skillframe.execution.prepare import load_robot_model, load_world
-from skillframe.extend.records import Document, RowResult, RowRun
+from skillframe.demonstration import Demonstration
+from skillframe.execution import load_robot_model, load_world
+from skillframe.extend import Document, RowResult, RowRun
 from skillframe.frames import Float, norm, quaternion_from_matrix, rotation_matrix, unit
-from skillframe.robot.model import RobotModel
-from skillframe.world.scene import Scene, State
-from skillframe.world.shapes import slope
+from skillframe.robot import RobotModel
+from skillframe.world import Scene, State, slope
 from skillframe_papers.rows import nulls
 from skillframe_papers.rows.harness import DOWN, Ran, X, Y, compared, lmc, not_behind, one_axis, teacher, world
 from skillframe_papers.rows.lmc import REDRAWN, pictures

@@ -15,17 +15,15 @@ from typing import NamedTuple
 import numpy as np
 from skillframe_baselines.replay import ReplaySettings
 
-from skillframe.demonstration.record import Demonstration
-from skillframe.document.file import learned
+from skillframe.demonstration import Demonstration
+from skillframe.document import learned
 from skillframe.errors import InputError
-from skillframe.execution.drive import Setup
-from skillframe.execution.prepare import load_robot_model, prepare
-from skillframe.extend.records import Document, LearnOptions, RowResult, RowRun
-from skillframe.extend.registry import registry
+from skillframe.execution import Setup, load_robot_model, prepare
+from skillframe.extend import Document, LearnOptions, RowResult, RowRun, registry
 from skillframe.frames import Float
 from skillframe.sequence import Part, Sequence
 from skillframe.skill import Skill
-from skillframe.world.scene import Scene
+from skillframe.world import Scene
 from skillframe_papers.rows.harness import (
     HEAD,
     Ran,

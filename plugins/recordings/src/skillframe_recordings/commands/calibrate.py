@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from skillframe.cli.options import layout_option
+from skillframe.cli import layout_option
 
 if TYPE_CHECKING:
     from skillframe_recordings.conditioning.calibrate import Calibrated
@@ -35,10 +35,9 @@ def command(files: tuple[Path, ...], out: Path, layout: Path | None) -> int:
     """
     import numpy as np
 
-    from skillframe.demonstration.convention import write_calibration
-    from skillframe.demonstration.options import read_layout
+    from skillframe.demonstration import read_layout, write_calibration
     from skillframe.errors import InputError
-    from skillframe.extend.reading import read_demonstration
+    from skillframe.extend import read_demonstration
     from skillframe.frames import rotate_spatial
     from skillframe_recordings.conditioning.calibrate import calibrate, plain
 

@@ -8,13 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from skillframe.cli.options import NUMBER, layout_option
-from skillframe.cli.output import emit_json
+from skillframe.cli import NUMBER, emit_json, layout_option
 from skillframe.config import parse_numbers
 from skillframe_recordings.commands.recordings import six
 
 if TYPE_CHECKING:
-    from skillframe.demonstration.record import Demonstration
+    from skillframe.demonstration import Demonstration
     from skillframe.signals import WrenchModel
     from skillframe_recordings.conditioning.offline import Removed
 
@@ -56,9 +55,8 @@ def command(
       skillframe filter demo.npz --out clean.npz
       skillframe filter free_motion.npz --weight --free-air 0,6 --method none --out identified.npz
     """
-    from skillframe.demonstration.faults.find import faults
-    from skillframe.demonstration.stalls import stalls
-    from skillframe.extend.reading import read_demonstration, write_demonstration
+    from skillframe.demonstration import faults, stalls
+    from skillframe.extend import read_demonstration, write_demonstration
     from skillframe_recordings.conditioning.offline import filter_wrench, remove_bias, smooth
 
     demonstration = read_demonstration(file, layout)

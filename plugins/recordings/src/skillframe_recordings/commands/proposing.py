@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from skillframe.cli.output import emit_json
+from skillframe.cli import emit_json
 
 if TYPE_CHECKING:
     from skillframe_recordings.proposal.propose import Proposal

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from skillframe.cli.output import emit_json, note
+from skillframe.cli import emit_json, note
 from skillframe_recordings.commands.proposing import proposed
 
 if TYPE_CHECKING:
@@ -41,8 +41,8 @@ def reading_options(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def reading_settings(layout: str | None, settings: Sequence[str]) -> dict[str, Any]:
     """Return the typed settings over those of a layout. Raises `InputError` for an unknown one or a wrong value."""
-    from skillframe.demonstration.options import read_layout, typed_settings
-    from skillframe.extend.reading import AUTO
+    from skillframe.demonstration import read_layout, typed_settings
+    from skillframe.extend import AUTO
 
     return {**({} if layout in (None, AUTO) else read_layout(Path(layout))), **typed_settings(settings)}
 
@@ -87,7 +87,7 @@ def convert(
       skillframe convert demo.mcap --set pose-topic=/tool_pose --set wrench-topic=/ft --out demo.npz
       skillframe convert demo.bag --set robot=panda --set wrench-topic=/ft --set wrench-frame=tool --out demo.npz
     """
-    from skillframe.extend.reading import AUTO, is_data_set, read_demonstration, write_data_set, write_demonstration
+    from skillframe.extend import AUTO, is_data_set, read_demonstration, write_data_set, write_demonstration
     from skillframe_recordings.audit import audit
 
     given = reading_settings(layout, settings)
@@ -164,7 +164,7 @@ def check(
       skillframe check log1.csv log2.csv --layout layout.toml
     """
     from skillframe.errors import SkillframeError
-    from skillframe.extend.reading import AUTO, read_demonstration
+    from skillframe.extend import AUTO, read_demonstration
     from skillframe_recordings.audit import audit, compared
 
     given, demonstrations = reading_settings(layout, settings), []

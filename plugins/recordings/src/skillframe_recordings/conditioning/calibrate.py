@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.convention import GRAVITY, Calibration
+from skillframe.demonstration import GRAVITY, Calibration
 from skillframe.errors import InputError
 from skillframe.frames import Float, cross, norm, rotate, rotation_matrix, rotation_vector, skew
 from skillframe_recordings.conditioning.payload import (

@@ -9,18 +9,25 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.contact import (
+from skillframe.demonstration import (
+    COPY,
     LEAST_SAMPLES,
     LEVEL_TIME,
+    SATURATED,
+    Demonstration,
+    Flaw,
     NoiseFigures,
+    Stall,
+    alive,
     contact_intervals,
+    faults,
     free_air_level,
+    kept,
+    kept_stalls,
     noise_figures,
+    stalls,
+    with_named,
 )
-from skillframe.demonstration.faults.fault import COPY, SATURATED, Flaw, kept
-from skillframe.demonstration.faults.find import alive, faults, with_named
-from skillframe.demonstration.record import Demonstration
-from skillframe.demonstration.stalls import Stall, kept_stalls, stalls
 from skillframe.errors import InputError
 from skillframe.frames import Float, matrix_from_quaternion, norm, rotate_spatial
 from skillframe.signals import WrenchFilter, WrenchModel

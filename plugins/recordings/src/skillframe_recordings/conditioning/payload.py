@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from skillframe.demonstration.convention import GRAVITY, weight_wrench
+from skillframe.demonstration import GRAVITY, weight_wrench
 from skillframe.errors import InputError
 from skillframe.frames import Float, norm, rotate, rotate_spatial, skew
 

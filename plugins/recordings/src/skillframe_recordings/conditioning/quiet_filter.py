@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.contact import detrended_std, window_rows
+from skillframe.demonstration import detrended_std, window_rows
 from skillframe.frames import Float, norm
 from skillframe.signals import WrenchFilter, WrenchModel
 

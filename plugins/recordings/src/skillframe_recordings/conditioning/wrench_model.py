@@ -10,9 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.contact import FLOOR, noise_figures
-from skillframe.demonstration.faults.find import alive as alive_samples
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import FLOOR, Demonstration, noise_figures
+from skillframe.demonstration import alive as alive_samples
 from skillframe.frames import Float
 from skillframe.signals import CHUNK, WrenchModel, chunks, steady_gain
 

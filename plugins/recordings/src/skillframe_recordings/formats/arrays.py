@@ -13,11 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.assemble import assemble_split, read_wrench_file
-from skillframe.demonstration.columns import KNOWN, left_out, name_columns
-from skillframe.demonstration.options import read_meta, read_options
-from skillframe.demonstration.record import Demonstration
-from skillframe.demonstration.table import Table
+from skillframe.demonstration import (
+    KNOWN,
+    Demonstration,
+    Table,
+    assemble_split,
+    left_out,
+    name_columns,
+    read_meta,
+    read_options,
+    read_wrench_file,
+)
 from skillframe.errors import InputError
 from skillframe_recordings.proposal.headers import picks
 

@@ -16,12 +16,19 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.demonstration.assemble import assemble
-from skillframe.demonstration.columns import POSITION, QUATERNION, WRENCH, Columns
-from skillframe.demonstration.options import ReadOptions, read_meta, read_options
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import (
+    POSITION,
+    QUATERNION,
+    WRENCH,
+    Columns,
+    Demonstration,
+    ReadOptions,
+    assemble,
+    read_meta,
+    read_options,
+)
 from skillframe.errors import InputError, UnknownName
-from skillframe.extend.records import Lazy
+from skillframe.extend import Lazy
 from skillframe.frames import Float, Pose, quaternion_from_matrix
 from skillframe_recordings.formats.bagfile import (
     TREES,
@@ -55,7 +62,7 @@ FORCE_WORDS = ("wrench", "force", "franka", "robotstate", "torque")
 STAMP_START = "header_stamp_start_ns"
 """Metadata key of the header stamp at time 0 [ns]."""
 
-TOOL_POSES = Lazy("skillframe.robot.kinematics:tool_poses")
+TOOL_POSES = Lazy("skillframe.robot:tool_poses")
 """Forward kinematics, loaded for joint states only."""
 
 

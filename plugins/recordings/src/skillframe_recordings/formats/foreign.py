@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.record import Demonstration
-from skillframe.demonstration.table import Table
+from skillframe.demonstration import Demonstration, Table
 from skillframe.errors import InputError
 from skillframe.files.documents import parse_json, read_arrays, read_text
 from skillframe_recordings.formats.arrays import read_as_table, table_of

@@ -33,11 +33,17 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.demonstration.assemble import assemble_split, read_wrench_file
-from skillframe.demonstration.columns import POSITION, QUATERNION, WRENCH, Columns
-from skillframe.demonstration.options import read_options
-from skillframe.demonstration.record import Demonstration
-from skillframe.demonstration.table import Table
+from skillframe.demonstration import (
+    POSITION,
+    QUATERNION,
+    WRENCH,
+    Columns,
+    Demonstration,
+    Table,
+    assemble_split,
+    read_options,
+    read_wrench_file,
+)
 from skillframe.errors import InputError, UnknownName, extras_named
 from skillframe.files import write_whole
 from skillframe.files.documents import NUMBER, refuse_bomb

@@ -22,8 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.demonstration.columns import POSITION, QUATERNION, WRENCH
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import POSITION, QUATERNION, WRENCH, Demonstration
 from skillframe.errors import InputError, extras_named
 from skillframe.files import not_written, write_whole
 from skillframe_recordings.formats.parquet import FORMAT, FORMAT_VERSION, FURTHER, OURS

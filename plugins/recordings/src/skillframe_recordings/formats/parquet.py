@@ -12,11 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.demonstration.assemble import assemble_split, read_wrench_file
-from skillframe.demonstration.columns import Columns
-from skillframe.demonstration.options import read_options
-from skillframe.demonstration.record import Demonstration
-from skillframe.demonstration.table import Table
+from skillframe.demonstration import Columns, Demonstration, Table, assemble_split, read_options, read_wrench_file
 from skillframe.errors import InputError, UnknownName, extras_named
 from skillframe.files.documents import NUMBER, read_json, refuse_bomb
 from skillframe_recordings.formats.arrays import read_as_table, table_of

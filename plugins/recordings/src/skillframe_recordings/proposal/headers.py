@@ -14,8 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.demonstration.columns import EULER, FORCE, MATRIX, POSITION, QUATERNION, ROTATION_VECTOR, TORQUE, WRENCH
-from skillframe.demonstration.table import Table
+from skillframe.demonstration import EULER, FORCE, MATRIX, POSITION, QUATERNION, ROTATION_VECTOR, TORQUE, WRENCH, Table
 from skillframe.frames import Float
 from skillframe_recordings.proposal.names import (
     ACCELERATIONS,

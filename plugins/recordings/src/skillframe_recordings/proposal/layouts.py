@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from skillframe.demonstration.options import FILES, TYPED, toml_text
+from skillframe.demonstration import FILES, TYPED, toml_text
 from skillframe.errors import InputError
 from skillframe.files import write_whole
 

@@ -11,8 +11,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from skillframe.demonstration.columns import EULER, QUANTITY
-from skillframe.demonstration.options import SCALES
+from skillframe.demonstration import EULER, QUANTITY, SCALES
 
 CLOCKS = {"t", "time", "timestamp", "stamp", "timestamps", "clock", "elapsed", "times"}
 SECONDS, NANOSECONDS = {"sec", "secs", "seconds"}, {"nsec", "nsecs", "nanosec", "nanosecs", "nanoseconds"}

@@ -17,15 +17,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.demonstration.checks import (
+from skillframe.demonstration import (
     LEAST_RESIDUAL,
     LEAST_TURN,
+    QUATERNION,
     RESIDUAL_RATIO,
     SHARES,
+    Columns,
     fit_weight_and_bias,
     refuse_jumps,
 )
-from skillframe.demonstration.columns import QUATERNION, Columns
 from skillframe.errors import InputError
 from skillframe.frames import (
     Float,

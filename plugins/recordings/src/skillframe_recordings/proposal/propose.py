@@ -10,8 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from skillframe.demonstration.options import NUMBERS
-from skillframe.demonstration.table import Table
+from skillframe.demonstration import NUMBERS, Table
 from skillframe_recordings.proposal.layouts import typed
 from skillframe_recordings.proposal.table_analysis import Look, Said
 

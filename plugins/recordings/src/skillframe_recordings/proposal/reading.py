@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from skillframe.errors import InputError, SkillframeError
-from skillframe.extend.reading import format_of, read_demonstration
+from skillframe.extend import format_of, read_demonstration
 from skillframe_recordings.formats.foreign import npz_table
 from skillframe_recordings.proposal.propose import Proposal, propose
 
 if TYPE_CHECKING:
-    from skillframe.demonstration.table import Table
+    from skillframe.demonstration import Table
 
 
 def propose_reading(path: Path | str, **options: Any) -> Proposal:

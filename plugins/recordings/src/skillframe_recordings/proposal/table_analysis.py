@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.demonstration.assemble import spread
-from skillframe.demonstration.columns import (
+from skillframe.demonstration import (
     EULER,
     KNOWN,
     MATRIX,
@@ -18,11 +17,12 @@ from skillframe.demonstration.columns import (
     POSITION,
     QUATERNION,
     ROTATION_VECTOR,
+    SCALES,
     SECONDS,
     WRENCH,
+    Table,
+    spread,
 )
-from skillframe.demonstration.options import SCALES
-from skillframe.demonstration.table import Table
 from skillframe.errors import InputError
 from skillframe.frames import Float, norm
 from skillframe_recordings.proposal import headers, names, values

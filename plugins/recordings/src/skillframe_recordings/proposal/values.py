@@ -13,8 +13,7 @@ from itertools import permutations
 
 import numpy as np
 
-from skillframe.demonstration.columns import MATRIX, POSITION, QUATERNION, ROTATION_VECTOR, WRENCH
-from skillframe.demonstration.options import SCALES
+from skillframe.demonstration import MATRIX, POSITION, QUATERNION, ROTATION_VECTOR, SCALES, WRENCH
 from skillframe.frames import Float, norm
 from skillframe_recordings.thresholds import PROPOSAL
 

@@ -12,18 +12,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skillframe.demonstration.checks import (
+from skillframe.demonstration import (
     LEAST_PATH,
     LEAST_RESIDUAL,
     LEAST_WEIGHT,
+    LEVEL_TIME,
     MOST_WEIGHT,
     RESIDUAL_RATIO,
     SHARES,
+    Demonstration,
     fit_weight_and_bias,
     work_cosine,
 )
-from skillframe.demonstration.contact import LEVEL_TIME
-from skillframe.demonstration.record import Demonstration
 from skillframe.frames import Float, norm, quaternion_from_matrix, rotate
 from skillframe_recordings.orientation_doubts import tared
 from skillframe_recordings.proposal.orientations import SAMPLES, weight_left

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from skillframe.errors import SkillframeError
-from skillframe.extend.records import DriveType, Lazy
+from skillframe.extend import DriveType, Lazy
 from skillframe_testkit.checks.problems import attempt
 from skillframe_testkit.checks.trials import SHORT_S, Push
 
@@ -24,8 +24,7 @@ def _make(drive: DriveType) -> Iterator[str]:
 
 
 def _drives(drive: DriveType) -> Iterator[str]:
-    from skillframe.execution.executor import Result, Setup, simulate
-    from skillframe.execution.prepare import load_robot_model, load_world
+    from skillframe.execution import Result, Setup, load_robot_model, load_world, simulate
 
     setup = Setup(robot=load_robot_model(drive.example), scene=load_world("free", {}), drive=drive)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import Demonstration
 from skillframe.frames import Float, Pose, rotation_matrix
 from skillframe.skill import Observation
 

@@ -9,7 +9,7 @@ from typing import Any, get_args
 import numpy as np
 
 from skillframe.errors import InputError
-from skillframe.extend.records import Axes, ExporterType, MovingImpedance
+from skillframe.extend import Axes, ExporterType, MovingImpedance
 from skillframe_testkit.checks.material import example_phase
 from skillframe_testkit.checks.problems import attempt
 from skillframe_testkit.checks.watch import left_behind, watched

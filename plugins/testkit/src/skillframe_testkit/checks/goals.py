@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from skillframe.errors import SkillframeError
-from skillframe.extend.records import WorldType
+from skillframe.extend import WorldType
 from skillframe.frames import Float, Pose, matrix_from_quaternion, rotation_matrix
 from skillframe_testkit.checks.playback import AGREEMENT, Rows
 
 if TYPE_CHECKING:
-    from skillframe.world.scene import Scene, State, Task
+    from skillframe.world import Scene, State, Task
 
 TRIED, SPREAD = 60, (0.1, 0.3)
 """States per round, and the first spread [m, rad]."""
@@ -22,7 +22,7 @@ TRIED, SPREAD = 60, (0.1, 0.3)
 
 def states_of(scene: Scene) -> State:
     """The same N states each time, from around the start to the smallest `goal_error`."""
-    from skillframe.world.scene import State
+    from skillframe.world import State
 
     rng, moved = np.random.default_rng(11), np.random.default_rng(12)
     base = matrix_from_quaternion(scene.start_quaternion if scene.task.aligned is None else scene.task.aligned)
@@ -44,7 +44,7 @@ def states_of(scene: Scene) -> State:
 
 def _travels(scene: Scene, rng: np.random.Generator) -> dict[str, Float]:
     """Travel of second parts (`TRIED`,) by name, within their range and mostly near its ends."""
-    from skillframe.world.scene import Mover
+    from skillframe.world import Mover
 
     found = {}
     for part in (each for each in scene.sprung if isinstance(each, Mover)):
@@ -57,7 +57,7 @@ def _travels(scene: Scene, rng: np.random.Generator) -> dict[str, Float]:
 
 def some(state: State, rows: Rows) -> State:
     """Rows of a state."""
-    from skillframe.world.scene import State
+    from skillframe.world import State
 
     second = {name: values[rows] for name, values in state.second.items()}
     return State(Pose(state.tip.position[rows], state.tip.rotation[rows]), state.wrench[rows], second)

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.campaign.rows import JUDGED, OUTCOME, cell
-from skillframe.execution.trace import Trace
-from skillframe.extend.records import MovingImpedance
+from skillframe.campaign import JUDGED, OUTCOME, cell
+from skillframe.execution import Trace
+from skillframe.extend import MovingImpedance
 from skillframe_testkit.checks.examples import DOWN, FRICTION, NORMAL_FORCE, SPEED
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skillframe.extend.records import CoordinatorType, Document, SkillType
+from skillframe.extend import CoordinatorType, Document, SkillType
 from skillframe.frames import Float
 from skillframe.handover import asked
 from skillframe.skill import Command, Observation, Skill

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
-from skillframe.extend.registry import Plugin, Registry
+from skillframe.extend import Plugin, Registry
 from skillframe_testkit.checks.drives import check_drive
 from skillframe_testkit.checks.exporters import check_exporter
 from skillframe_testkit.checks.problems import attempt

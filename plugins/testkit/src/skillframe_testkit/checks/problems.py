@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from skillframe.extend.records import Document
+from skillframe.extend import Document
 
 
 def attempt(what: str, check: Callable[[], Iterable[str]]) -> list[str]:

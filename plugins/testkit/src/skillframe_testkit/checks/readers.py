@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 
-from skillframe.demonstration.record import Demonstration
+from skillframe.demonstration import Demonstration
 from skillframe.errors import InputError
-from skillframe.extend.records import ReaderType
+from skillframe.extend import ReaderType
 from skillframe_testkit.checks.examples import example_demonstrations
 from skillframe_testkit.checks.problems import attempt
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from skillframe.errors import SkillframeError
-from skillframe.extend.records import RobotType
+from skillframe.extend import RobotType
 from skillframe_testkit.checks.problems import attempt
 from skillframe_testkit.checks.trials import SHORT_S, Push
 
@@ -30,9 +30,8 @@ def _folder(robot: RobotType) -> Iterator[str]:
 
 
 def _loads(robot: RobotType) -> Iterator[str]:
-    from skillframe.extend.drives import require_driven
-    from skillframe.robot.model import load_model
-    from skillframe.robot.spec import load_robot
+    from skillframe.extend import require_driven
+    from skillframe.robot import load_model, load_robot
 
     folder = Path(robot.folder)
     try:
@@ -49,8 +48,8 @@ def _loads(robot: RobotType) -> Iterator[str]:
 
 
 def _dynamics(robot: RobotType) -> Iterator[str]:
-    from skillframe.extend.drives import audit
-    from skillframe.robot.spec import load_robot
+    from skillframe.extend import audit
+    from skillframe.robot import load_robot
 
     for problem in audit(load_robot(Path(robot.folder))).problems:
         if problem.severity == "fatal":
@@ -59,8 +58,7 @@ def _dynamics(robot: RobotType) -> Iterator[str]:
 
 def _stands(robot: RobotType) -> Iterator[str]:
     """Check that it holds its start in empty space for 0.1 s, without actuators only."""
-    from skillframe.execution.executor import Setup, simulate
-    from skillframe.execution.prepare import load_robot_model, load_world
+    from skillframe.execution import Setup, load_robot_model, load_world, simulate
 
     model = load_robot_model(str(robot.folder))
     if model.spec.actuation:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.errors import SkillframeError
-from skillframe.extend.records import Document, SkillType
+from skillframe.extend import Document, SkillType
 from skillframe.frames import Float, Pose, norm, rotation_matrix, rotation_vector
 from skillframe.handover import CommandCheck, asked, check_shapes, shown
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons

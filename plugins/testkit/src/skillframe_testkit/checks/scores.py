@@ -8,8 +8,8 @@ import re
 import time
 from collections.abc import Iterator, Sequence
 
-from skillframe.execution.trace import ScoreFailed, Trace, read_only, score_of
-from skillframe.extend.records import ScoreType
+from skillframe.execution import ScoreFailed, Trace, read_only, score_of
+from skillframe.extend import ScoreType
 from skillframe_testkit.checks.material import example_trace
 from skillframe_testkit.checks.problems import attempt
 from skillframe_testkit.checks.watch import left_behind, watched

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from xml.etree import ElementTree
 
-from skillframe.extend.records import Grid, Illustration, ReportFiles, SectionType, part_problem
+from skillframe.extend import Grid, Illustration, ReportFiles, SectionType, part_problem
 from skillframe_testkit.checks.material import example_campaign
 from skillframe_testkit.checks.problems import attempt
 from skillframe_testkit.checks.watch import left_behind, read_elsewhere, watched

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from typing import Any
 
-from skillframe.demonstration.record import Demonstration
-from skillframe.extend.records import Document, SegmenterType
+from skillframe.demonstration import Demonstration
+from skillframe.extend import Document, SegmenterType
 from skillframe_testkit.checks.examples import example_demonstrations
 from skillframe_testkit.checks.problems import attempt, json_problems
 

@@ -13,9 +13,8 @@ from functools import partial
 
 import numpy as np
 
-from skillframe.document.file import new_document
-from skillframe.document.frame import frame_at
-from skillframe.extend.records import Document, LearnOptions, SkillType, Stalled
+from skillframe.document import frame_at, new_document
+from skillframe.extend import Document, LearnOptions, SkillType, Stalled
 from skillframe.frames import Float, norm, rotation_vector
 from skillframe.skill import Command, Skill, Status, row
 from skillframe_testkit.checks import running
@@ -37,7 +36,7 @@ from skillframe_testkit.checks.watch import printed, watched
 
 def example_document(skill: SkillType) -> Document:
     """The type's own example document, or one learned from the example demonstrations."""
-    from skillframe.document.file import learned
+    from skillframe.document import learned
 
     return learned(skill, example_demonstrations()) if skill.example is None else skill.example()
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from skillframe.extend.records import Document, SkillType
+from skillframe.extend import Document, SkillType
 from skillframe.handover import asked
 from skillframe.skill import Skill, rows_of
 from skillframe_testkit.checks.playback import (

@@ -15,8 +15,8 @@ from skillframe.frames import Float, Pose, matrix_from_quaternion
 from skillframe.skill import Command, Impedance, Observation, Skill, no_reasons
 
 if TYPE_CHECKING:
-    from skillframe.robot.model import RobotModel
-    from skillframe.world.scene import Scene
+    from skillframe.robot import RobotModel
+    from skillframe.world import Scene
 
 ROBOTS = ("free_tool", "panda")
 LARGEST = {"fixture": 10.0, "tool": 3.0, "start": 10.0}
@@ -60,7 +60,7 @@ def points_into_the_fixture(scene: Scene) -> Iterator[str]:
 
 def compiles(scene: Scene) -> Iterator[str]:
     """Check that MuJoCo compiles it, with the tool near and outside the fixture."""
-    from skillframe.world.convert import build_spec
+    from skillframe.world import build_spec
 
     for name, robot, configuration in _robots(scene):
         try:
@@ -76,9 +76,9 @@ def compiles(scene: Scene) -> Iterator[str]:
 
 
 def _robots(scene: Scene) -> Iterator[tuple[str, RobotModel, Float]]:
-    from skillframe.execution.prepare import load_robot_model
-    from skillframe.robot.kinematics import UnreachablePose
-    from skillframe.world.placement import start_configurations
+    from skillframe.execution import load_robot_model
+    from skillframe.robot import UnreachablePose
+    from skillframe.world import start_configurations
 
     for name in ROBOTS:
         robot = load_robot_model(name)
@@ -95,9 +95,7 @@ def _gap(scene: Scene, robot: RobotModel, model: Any, configuration: Float) -> f
     """
     import mujoco
 
-    from skillframe.world.convert import FIXTURE, SPRUNG, TOOL
-    from skillframe.world.placement import fixture_poses
-    from skillframe.world.plant import Plant
+    from skillframe.world import FIXTURE, SPRUNG, TOOL, Plant, fixture_poses
 
     plant = Plant(robot, scene, 1, fixture_poses(robot, {}, 1), {})
     plant.reset(configuration)
@@ -142,7 +140,7 @@ class Push(Skill):
 
 def runs(scene: Scene) -> Iterator[str]:
     """Check that 100 ms of holding and pushing stay finite and within limits."""
-    from skillframe.execution.executor import Setup, simulate
+    from skillframe.execution import Setup, simulate
 
     for name, robot, _ in _robots(scene):
         what = f"holding the tool at the start and pushing it 10 mm, {1e3 * SHORT_S:g} ms with {name},"

@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from skillframe.extend.records import WorldType
+from skillframe.extend import WorldType
 from skillframe.frames import Pose, matrix_from_quaternion
 from skillframe_testkit.checks import goals, trials
 from skillframe_testkit.checks.problems import attempt
 from skillframe_testkit.checks.watch import left_behind, printed, watched
 
 if TYPE_CHECKING:
-    from skillframe.world.scene import Geom, Scene
+    from skillframe.world import Geom, Scene
 
 
 def check_world(world: WorldType) -> list[str]:
@@ -87,7 +87,7 @@ def _placement_problems(scene: Scene) -> Iterator[str]:
 
 
 def _goal_problems(scene: Scene) -> Iterator[str]:
-    from skillframe.world.scene import State
+    from skillframe.world import State
 
     position = np.tile(np.array(scene.start_tip, dtype=float), (3, 1))
     rotation = np.tile(matrix_from_quaternion(scene.start_quaternion), (3, 1, 1))

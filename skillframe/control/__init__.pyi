@@ -1,0 +1,14 @@
+from .admittance import CALMING as CALMING
+from .admittance import MASS as MASS
+from .admittance import MEMORY as MEMORY
+from .admittance import QUIET_FORCE as QUIET_FORCE
+from .admittance import QUIET_TORQUE as QUIET_TORQUE
+from .admittance import SHARE as SHARE
+from .admittance import SLOW as SLOW
+from .impedance import critical_damping as critical_damping
+from .joint_steps import LEASH_SLACK as LEASH_SLACK
+from .limits import Glance as Glance
+from .limits import LimitGuard as LimitGuard
+from .motors import InnerLoop as InnerLoop
+from .motors import Motors as Motors
+from .motors import joint_limits as joint_limits

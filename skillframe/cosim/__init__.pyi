@@ -1,0 +1,9 @@
+from .coupling import Coupling as Coupling
+from .coupling import coupling_numbers as coupling_numbers
+from .coupling import require_stable as require_stable
+from .energy_balance import Mechanics as Mechanics
+from .energy_balance import Motion as Motion
+from .energy_balance import bond_work as bond_work
+from .energy_balance import relative_residual as relative_residual
+from .master import CosimSettings as CosimSettings
+from .master import Master as Master
