@@ -198,15 +198,11 @@ def _cure(d: Demonstration) -> str:
 
 def compared(demonstrations: list[Demonstration], audits: list[DemonstrationAudit]) -> list[DemonstrationAudit]:
     """Return audits with warnings about the set: duplicates, and odd directions."""
-    said = zip(audits, _repeats(demonstrations), _odd_ways(demonstrations), strict=True)
-    return [dataclasses.replace(a, warnings=[*a.warnings, *filter(None, texts)]) for a, *texts in said]
-
-
-def _repeats(demonstrations: list[Demonstration]) -> list[str]:
-    """A sentence for each recording that has the samples of an earlier one."""
     columns = [np.concatenate([d.position, d.quaternion, d.wrench], axis=1) for d in demonstrations]
     twins = [next(i for i in range(k + 1) if np.array_equal(columns[i], own)) for k, own in enumerate(columns)]
-    return [f"repeated: the same samples as {demonstrations[i].source}" * (i != k) for k, i in enumerate(twins)]
+    repeats = [f"repeated: the same samples as {demonstrations[i].source}" * (i != k) for k, i in enumerate(twins)]
+    said = zip(audits, repeats, _odd_ways(demonstrations), strict=True)
+    return [dataclasses.replace(a, warnings=[*a.warnings, *filter(None, texts)]) for a, *texts in said]
 
 
 def _odd_ways(demonstrations: list[Demonstration]) -> list[str]:

@@ -135,7 +135,11 @@ def _write_frames(
     import pyarrow.parquet
 
     tasks, rows, total, stats = _tasks(demonstrations), [], 0, list[dict[str, dict[str, Any]]]()
-    schema = pyarrow.schema([(name, _type(pyarrow, about)) for name, about in features.items()])
+    fields = []
+    for name, about in features.items():
+        kind = pyarrow.float32() if about["dtype"] == "float32" else pyarrow.int64()
+        fields.append((name, kind if about["shape"] == [1] else pyarrow.list_(kind, about["shape"][0])))
+    schema = pyarrow.schema(fields)
     number, written, writer = 0, 0, None
     try:
         for episode, d in enumerate(demonstrations):
@@ -148,7 +152,12 @@ def _write_frames(
                 path = folder / _DATA.format(c=number // CHUNK_FILES, f=number % CHUNK_FILES)
                 path.parent.mkdir(parents=True, exist_ok=True)
                 writer = pyarrow.parquet.ParquetWriter(path, schema)
-            columns = [_column(pyarrow, arrays[name], schema.field(name).type) for name in features]
+            columns = [
+                pyarrow.array(array, type=schema.field(name).type)
+                if array.ndim == 1
+                else pyarrow.FixedSizeListArray.from_arrays(pyarrow.array(array.ravel()), array.shape[1])
+                for name, array in ((name, arrays[name]) for name in features)
+            ]
             writer.write_table(pyarrow.Table.from_arrays(columns, schema=schema))
             written += size
             stats.append({name: _statistics(array) for name, array in arrays.items()})
@@ -178,17 +187,6 @@ def _frames(d: Demonstration, episode: int, first: int, task: int, fps: int) -> 
         "timestamp": (index / fps).astype(np.float32), "episode_index": np.full(count, episode),
         "frame_index": index, "index": first + index, "task_index": np.full(count, task),
     }  # fmt: skip
-
-
-def _type(pyarrow: Any, about: Mapping[str, Any]) -> Any:
-    plain = pyarrow.float32() if about["dtype"] == "float32" else pyarrow.int64()
-    return plain if about["shape"] == [1] else pyarrow.list_(plain, about["shape"][0])
-
-
-def _column(pyarrow: Any, array: NDArray[Any], kind: Any) -> Any:
-    if array.ndim == 1:
-        return pyarrow.array(array, type=kind)
-    return pyarrow.FixedSizeListArray.from_arrays(pyarrow.array(array.ravel()), array.shape[1])
 
 
 def _statistics(array: NDArray[Any]) -> dict[str, Any]:
