@@ -123,12 +123,11 @@ def _event_marks(axes: Axes, events: Sequence[tuple[float, str]]) -> Markup:
             labels = (
                 [*labels[:-1], (labels[-1][0], f"{labels[-1][1]}, {index}")] if together else [*labels, (x, f"{index}")]
             )
-    return join([*lines, *(_event_label(axes, x, label) for x, label in labels)])
-
-
-def _event_label(axes: Axes, x: float, label: str) -> Markup:
-    at_edge = x + 6.0 * len(label) > axes.right
-    return text(x - 3 if at_edge else x + 3, axes.top + 9, label, "event-text", "end" if at_edge else "start")
+    for x, label in labels:
+        at_edge = x + 6.0 * len(label) > axes.right
+        side, anchor = (-3, "end") if at_edge else (3, "start")
+        lines.append(text(x + side, axes.top + 9, label, "event-text", anchor))
+    return join(lines)
 
 
 def events_of(trace: Trace) -> list[tuple[float, str]]:
