@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skillframe.demonstration.assemble import NOTES
 from skillframe.demonstration.checks import GAP, angles_between
@@ -110,7 +109,11 @@ def audit(demonstration: Demonstration) -> DemonstrationAudit:
     dark = [s.stop for s in found if s.what != POSE]
     dark += [f.stop for f in wrong if f.kind == fault.COPY and f.what != POSE]
     unseen = [c.start for c in contacts if any(0.0 <= c.start - stop < LEVEL_TIME for stop in dark)]
-    drift = _drift(d, contacts, level, live)
+    drift = None  # change of the free-air level, if both ends are in free air, at rest and sound
+    ends = (d.time <= d.time[0] + LEVEL_TIME) | (d.time >= d.time[-1] - LEVEL_TIME)
+    calm = contacts and d.time[-1] - contacts[-1].stop >= 2.0 * LEVEL_TIME and d.duration >= 4.0 * LEVEL_TIME
+    if calm and np.all(live[ends]):
+        drift = free_air_level(d.time, d.wrench, (float(d.time[-1]) - LEVEL_TIME, float(d.time[-1]))) - level
     # at 20 Hz, so that noise does not accumulate
     stride = max(1, min(round(d.rate / 20.0), len(d) // 2))
     pick = np.r_[np.arange(0, len(d) - 1, stride), len(d) - 1]
@@ -149,16 +152,6 @@ def audit(demonstration: Demonstration) -> DemonstrationAudit:
         notes=list(d.meta.get(NOTES, [])), warnings=warnings,
         usable=usable,
     )  # fmt: skip
-
-
-def _drift(d: Demonstration, contacts: list[Contact], level: Float, live: NDArray[np.bool_]) -> Float | None:
-    """Change of the free-air level, or None if either end is in contact, moving or stalled."""
-    if not np.all(live[(d.time <= d.time[0] + LEVEL_TIME) | (d.time >= d.time[-1] - LEVEL_TIME)]):
-        return None
-    if not contacts or d.time[-1] - contacts[-1].stop < 2.0 * LEVEL_TIME or d.duration < 4.0 * LEVEL_TIME:
-        return None
-    last = free_air_level(d.time, d.wrench, (float(d.time[-1]) - LEVEL_TIME, float(d.time[-1])))
-    return last - level
 
 
 def _wrench_warnings(

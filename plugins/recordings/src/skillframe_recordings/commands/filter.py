@@ -84,7 +84,9 @@ def command(
     write_demonstration(demonstration, out)
     said = demonstration.meta.get("conditioning", {})
     if as_json:
-        emit_json({**_plain(said), "written": str(out)})
+        payload = said.get("payload", {})  # infinite condition numbers become null
+        payload = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in payload.items()}
+        emit_json({**said, **({"payload": payload} if payload else {}), "written": str(out)})
     else:
         _show(out, removed, said)
     return 0
@@ -114,14 +116,6 @@ def _model(demonstration: Demonstration, noise: tuple[float, float] | None, corn
     if not np.all(corners > 0.0) or (noise is not None and min(noise) <= 0.0):
         raise click.UsageError("--noise and --corner must be above 0")
     return WrenchModel.from_corner(model.noise if noise is None else np.repeat(noise, 3), corners, dt)
-
-
-def _plain(said: dict[str, Any]) -> dict[str, Any]:
-    """Replace infinite condition numbers by None for JSON."""
-    payload = {
-        k: v if not isinstance(v, float) or math.isfinite(v) else None for k, v in said.get("payload", {}).items()
-    }
-    return {**said, **({"payload": payload} if payload else {})}
 
 
 def _show(out: Path, removed: Removed | None, said: dict[str, Any]) -> None:

@@ -208,7 +208,7 @@ def _show(found: DemonstrationAudit) -> None:
         ("noise", f"{six(found.noise)} at rest; {six(found.noise_typical)} typically"),
         ("drift", six(found.drift) if found.drift else "not seen (it does not end in free air)"),
         ("peak", f"{found.peak_force_n:.2f} N, {counted(found.spikes, 'spike')}"),
-        ("contact", f"above {found.contact_threshold_n:.2f} N: {_first(contacts) or 'none'}"),
+        ("contact", f"above {found.contact_threshold_n:.2f} N: " + (_first(contacts) or "none")),
         *([("stalls", ", ".join(stalls))] if stalls else []),
         *([("faults", _first(faults))] if faults else []),
     ]

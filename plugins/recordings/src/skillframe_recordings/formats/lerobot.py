@@ -50,7 +50,12 @@ def write_lerobot(demonstrations: Sequence[Demonstration], folder: Path) -> None
     fps = _rate(demonstrations)
     own = {"observation.state": POSE, "observation.wrench": WRENCH, "action": POSE}
     about = {name: {"dtype": "float32", "shape": [len(n)], "names": [*n]} for name, n in own.items()}
-    about |= {name: _scalar("float32") for name in _further(demonstrations)}
+    names = sorted(demonstrations[0].extra)
+    for d in demonstrations:
+        if sorted(d.extra) != names:
+            text = f"has the further columns {sorted(d.extra)}, and the first demonstration {names}"
+            raise InputError(d.source or "demonstration", text, "write the same columns into all")
+    about |= {f"{FURTHER}{name}": _scalar("float32") for name in names}
     kinds = ("episode_index", "frame_index", "index", "task_index")
     features = {**about, "timestamp": _scalar("float32"), **{name: _scalar("int64") for name in kinds}}
     with _whole_folder(folder) as made:
@@ -108,15 +113,6 @@ def _rate(demonstrations: Sequence[Demonstration]) -> int:
 
 def _scalar(kind: str) -> dict[str, Any]:
     return {"dtype": kind, "shape": [1], "names": None}
-
-
-def _further(demonstrations: Sequence[Demonstration]) -> list[str]:
-    names = sorted(demonstrations[0].extra)
-    for d in demonstrations:
-        if sorted(d.extra) != names:
-            text = f"has the further columns {sorted(d.extra)}, and the first demonstration {names}"
-            raise InputError(d.source or "demonstration", text, "write the same columns into all")
-    return [f"{FURTHER}{name}" for name in names]
 
 
 def _tasks(demonstrations: Sequence[Demonstration]) -> list[str]:

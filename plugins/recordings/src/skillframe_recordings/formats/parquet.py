@@ -6,7 +6,7 @@ Version 2 has a file per episode, version 3 several; `--set episode=3` chooses o
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -146,17 +146,15 @@ def _arrays(path: Path) -> Arrays:
         if not wanted:
             there = ", ".join(f"{f.name} ({f.type})" for f in schema)
             raise InputError(path, f"holds no numbers; its columns are {there}", "give a table of samples")
-        refuse_bomb(path, path.stat().st_size, _declared(pyarrow.parquet.read_metadata(path), wanted), LARGE)
+        metadata = pyarrow.parquet.read_metadata(path)
+        groups = (metadata.row_group(i) for i in range(metadata.num_row_groups))
+        columns = (group.column(j) for group in groups for j in range(group.num_columns))
+        wide = [c for c in columns if c.path_in_schema.split(".")[0] in wanted or c.path_in_schema in wanted]
+        declared = sum(max(NUMBER * int(c.num_values), int(c.total_uncompressed_size)) for c in wide)
+        refuse_bomb(path, path.stat().st_size, declared, LARGE)
         table = pyarrow.parquet.read_table(path, columns=wanted)
         arrays = {name: _column(pyarrow, table.column(name).combine_chunks()) for name in wanted}
     return {name: array for name, array in arrays.items() if array is not None}
-
-
-def _declared(metadata: Any, wanted: Sequence[str]) -> int:
-    groups = (metadata.row_group(i) for i in range(metadata.num_row_groups))
-    columns = (group.column(j) for group in groups for j in range(group.num_columns))
-    wide = [c for c in columns if c.path_in_schema.split(".")[0] in wanted or c.path_in_schema in wanted]
-    return sum(max(NUMBER * int(c.num_values), int(c.total_uncompressed_size)) for c in wide)
 
 
 def _is_list(pyarrow: Any, kind: Any) -> bool:

@@ -129,7 +129,10 @@ def _without_log(word: str) -> str:
 
 def groups_of(names: Sequence[str]) -> list[Group]:
     """Return the groups of a header in the order of their first columns."""
-    cuts = [(*cut(name), _capital(name)) for name in names]
+    cuts = []
+    for name in names:
+        letters = re.findall(r"[A-Za-z]", split_unit(name)[0])
+        cuts.append((*cut(name), bool(letters) and letters[-1].isupper()))
     cases: dict[tuple[tuple[str, ...], str], set[bool]] = {}
     for words, axis, capital in cuts:
         cases.setdefault((words, axis), set()).add(capital)
@@ -138,11 +141,6 @@ def groups_of(names: Sequence[str]) -> list[Group]:
     for index, (words, axis, capital) in enumerate(cuts):
         result.setdefault((words, capital and words in both), {}).setdefault(axis, index)
     return [Group(words, columns) for (words, _), columns in result.items()]
-
-
-def _capital(name: str) -> bool:
-    letters = re.findall(r"[A-Za-z]", split_unit(name)[0])
-    return bool(letters) and letters[-1].isupper()
 
 
 def said_units(names: Sequence[str], picks: Mapping[str, int]) -> dict[str, str]:

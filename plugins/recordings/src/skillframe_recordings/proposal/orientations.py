@@ -78,16 +78,15 @@ def quaternion_readings(values: Float) -> list[OrientationReading]:
 
 def angle_readings(angles: Float) -> list[OrientationReading]:
     """Return the six orders of roll, pitch, yaw (T, 3) [rad] about moving axes. Fixed axes reverse them."""
-    return [OrientationReading("".join(order), _moving(angles, order)) for order in permutations("XYZ")]
-
-
-def _moving(angles: Float, order: Sequence[str]) -> Float:
-    result: Float = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
-    for axis in order:
-        vector = np.zeros_like(angles)
-        vector[:, "XYZ".index(axis)] = angles[:, "XYZ".index(axis)]
-        result = result @ rotation_matrix(vector)
-    return result
+    readings = []
+    for order in permutations("XYZ"):
+        turn: Float = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
+        for axis in map("XYZ".index, order):
+            vector = np.zeros_like(angles)
+            vector[:, axis] = angles[:, axis]
+            turn = turn @ rotation_matrix(vector)
+        readings.append(OrientationReading("".join(order), turn))
+    return readings
 
 
 def vector_reading(vector: Float) -> OrientationReading:
