@@ -59,9 +59,13 @@ def time_plot(
         shades(axes, time, shaded),
         *(axes.line(*envelope(time, c.values), c.stroke) for c in curves),
     ]
+    content.append(legend(axes, names))
+    if limit is not None and axes.inside(limit):
+        y = float(axes.up(limit))
+        beside = y - 5 if y - axes.top > 24.0 else y + 12  # the numbers of events are at the top
+        said = text(LEFT + 6, beside, f"limit {limit:g} {unit}", "limit-text", "start")
+        content += [axes.horizontal(limit, "limit"), said]
     content += [
-        legend(axes, names),
-        _limit_line(axes, limit, unit),
         _event_marks(axes, events),
         tag("line", x1=0, x2=0, y1=axes.top, y2=axes.bottom, class_="cursor"),
     ]
@@ -96,16 +100,6 @@ def doubted(columns: Mapping[str, Float]) -> NDArray[np.bool_] | None:
     """Return (T,) where an estimated force is invalid, or None without such a column."""
     # 1 for a valid estimate, and between 0 and 1 where it was resampled
     return columns["force_valid"] < 0.5 if "force_valid" in columns else None
-
-
-def _limit_line(axes: Axes, limit: float | None, unit: str) -> Markup:
-    if limit is None or not axes.inside(limit):
-        return Markup("")
-    y = float(axes.up(limit))
-    beside = y - 5 if y - axes.top > 24.0 else y + 12  # the numbers of events are at the top
-    return join(
-        [axes.horizontal(limit, "limit"), text(LEFT + 6, beside, f"limit {limit:g} {unit}", "limit-text", "start")]
-    )
 
 
 def _event_marks(axes: Axes, events: Sequence[tuple[float, str]]) -> Markup:

@@ -23,8 +23,6 @@ from skillframe_reports.results import ResultRow, Results
 from skillframe_reports.svg import Axes, Point, padded, picture
 from skillframe_reports.theory import Region
 
-MOST = 12
-
 
 class Measure(NamedTuple):
     """A column with its words, display unit and factor.
@@ -74,7 +72,8 @@ class Effect(NamedTuple):
 
 def what_if(results: Results, limits: Sequence[Region]) -> Markup:
     """Return the section: curves and a sentence for each quantity, most influential first."""
-    names = influence(results)[:MOST]
+    ranked = influence(results)
+    names = ranked[:12]
     if not names:
         return Markup("")
     found = {name: [*_effects(results, quantity(name))] for name in names}
@@ -96,7 +95,7 @@ def what_if(results: Results, limits: Sequence[Region]) -> Markup:
             tag("p", *(f"{each} " for each in words if each)),
             tag("div", *curves, class_="grid three"),
         ]
-    if left_out := influence(results)[MOST:]:
+    if left_out := ranked[12:]:
         parts.append(note(f"Less telling and not drawn: {', '.join(quantity(name).label for name in left_out)}."))
     return join(parts)
 
