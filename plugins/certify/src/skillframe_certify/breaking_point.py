@@ -24,8 +24,8 @@ from skillframe_certify.engine import Looked, Say
 
 BUDGET = {1: 96, 2: 256, 3: 384, 4: 600, 5: 960, 6: 960}
 """Most trials of a search, by the number of quantities."""
-AGAIN, MOST_AGAIN = 8, 3
-"""Fresh trials at a point to confirm, and the most points that are tried, smallest first."""
+AGAIN = 8
+"""Fresh trials at a point to confirm."""
 INSIDE = 0.97
 """Share of the smallest radius so far at which a new ray is tried."""
 APART = np.cos(np.radians(30.0))
