@@ -110,7 +110,10 @@ def split_unit(name: str) -> tuple[str, str | None]:
 def cut(name: str) -> tuple[tuple[str, ...], str]:
     """Return a name's words and axis: a letter, number, roll, pitch, yaw, or ""."""
     name = split_unit(name)[0]
-    words = [_without_log(word) for word in re.findall(r"[a-z]+|\d+", CAMEL.sub(" ", name).lower())]
+    words = []
+    for word in re.findall(r"[a-z]+|\d+", CAMEL.sub(" ", name).lower()):
+        short = re.sub(r"(log|logs|data|traj)$", "", word)  # "plog" is "p"
+        words.append(short if short in MEANT - NOT_MEASURED else word)
     if not words:
         return (), ""
     *rest, last = words
@@ -119,12 +122,6 @@ def cut(name: str) -> tuple[tuple[str, ...], str]:
     if last[-1] in LETTERS and last[:-1] in FUSED:
         return (*rest, last[:-1]), last[-1]
     return tuple(words), ""
-
-
-def _without_log(word: str) -> str:
-    """Remove a fused recording word: "plog" becomes "p"."""
-    short = re.sub(r"(log|logs|data|traj)$", "", word)
-    return short if short in MEANT - NOT_MEASURED else word
 
 
 def groups_of(names: Sequence[str]) -> list[Group]:
