@@ -128,20 +128,18 @@ def events_of(trace: Trace) -> list[tuple[float, str]]:
     """Return events of a trace as (time [s], text), in order."""
     pairs = [e for e in trace.meta.get("events") or [] if isinstance(e, list | tuple) and len(e) == 2]
     told = [(float(when), str(what)) for when, what in pairs if isinstance(when, int | float)]
-    return sorted(told or _read_off(trace))
-
-
-def _read_off(trace: Trace) -> list[tuple[float, str]]:
+    if told:
+        return sorted(told)
     time, force = np.asarray(trace.time, dtype=float), np.nan_to_num(norm(trace.wrench[:, :3]))
     # of a real run: 4 standard deviations of its sensor, which one of 16,000 samples of noise exceeds
     least = max(CONTACT_N, 4.0 * (trace.meta.get("sensor_noise_n") or 0.0))
     touching = np.flatnonzero(np.nan_to_num(norm(trace.wrench_true[:, :3])) > least)
-    events = [(float(time[touching[0]]), "first contact")] if len(touching) else []
+    told += [(float(time[touching[0]]), "first contact")] if len(touching) else []
     if force.max() > CONTACT_N:
         how = "estimated" if trace.estimated else "measured"
-        events.append((float(time[np.argmax(force)]), f"highest {how} force, {force.max():.0f} N"))
+        told.append((float(time[np.argmax(force)]), f"highest {how} force, {force.max():.0f} N"))
     reason = str(trace.meta.get("reason") or trace.meta.get("failure") or "")
-    return [*events, (float(time[-1]), f"the end: {reason}" if reason else "the end")]
+    return sorted([*told, (float(time[-1]), f"the end: {reason}" if reason else "the end")])
 
 
 def run_plots(trace: Trace, force_limit: float | None = None) -> list[Markup]:
