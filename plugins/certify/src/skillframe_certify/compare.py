@@ -144,7 +144,11 @@ def compare(trials: Trials, alpha: float = 0.05, better: int = 0) -> Judgement:
         better: 0 compares successes, 1 scores (higher is better), -1 scores (lower is better).
     """
     ran = {policy: [row for row in trials.rows if row.policy == policy] for policy in trials.policies}
-    order = sorted(trials.policies, key=lambda policy: _rank(ran[policy], better))
+    if better:
+        ranks = {policy: -better * float(np.median([row.score for row in rows])) for policy, rows in ran.items()}
+    else:
+        ranks = {policy: -sum(row.success for row in rows) / len(rows) for policy, rows in ran.items()}
+    order = sorted(trials.policies, key=lambda policy: ranks[policy])
     names = list(combinations(order, 2))
     evidence = [evidence_of(trials, first, second, better) for first, second in names]
     rows, corrected = holm_of_minima(evidence, len(trials.rows))
@@ -161,12 +165,6 @@ def compare(trials: Trials, alpha: float = 0.05, better: int = 0) -> Judgement:
         quartiles = np.quantile([row.score for row in ran[policy]], (0.25, 0.5, 0.75)).tolist() if better else []
         standings.append(Ranked(policy, count, won, interval.low, interval.high, marks[policy], tuple(quartiles)))
     return Judgement(standings=tuple(standings), pairs=pairs, alpha=alpha, doubts=trials.doubts)
-
-
-def _rank(ran: Sequence[Trial], better: int) -> float:
-    if better:
-        return -better * float(np.median([row.score for row in ran]))
-    return -sum(row.success for row in ran) / len(ran)
 
 
 def evidence_of(trials: Trials, first: str, second: str, better: int = 0) -> Evidence:

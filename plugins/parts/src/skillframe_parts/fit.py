@@ -24,7 +24,6 @@ TOUCH = OVERLAP
 NEAR = 8e-4
 """Sideways distance [m] from the held part within which material belongs to the hole entrance."""
 Axis = tuple[float, float, float]
-_AXES = ((0, 0, -1), (0, 0, 1), (-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0))
 
 
 class WayOut(NamedTuple):
@@ -178,7 +177,8 @@ def _axis(
     """Rotation of the given or first free axis to down, and the axis. Tried: six axes, then normals of the plug."""
     given = file.task.axis
     blocked = []
-    for axis in (*_AXES, *face_normals(one)) if given == "auto" else (given,):
+    six = ((0, 0, -1), (0, 0, 1), (-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0))
+    for axis in (*six, *face_normals(one)) if given == "auto" else (given,):
         along = np.array(axis, dtype=float) / np.linalg.norm(axis)
         turn = _down(along)
         there, way = (_turned(one, turn), _turned(two, turn)), WayOut()
