@@ -87,7 +87,7 @@ def test_the_peeled_box_of_an_ellipse_is_nearly_the_largest_that_fits():
 
 @pytest.mark.slow
 def test_no_box_is_proposed_over_places_where_two_trials_in_three_succeed():
-    """Left of the middle all succeed, right of it 65 %: more than half, and less than LIKELY."""
+    """Left of the middle all succeed, right of it 65 %: more than half, and less than the 80 % that count."""
     works = (CLOUD[:512, 0] < 0.0) | (np.random.default_rng(5).random(512) < 0.65)
     question = Question(rate=0.95, confidence=0.95, ranges={"x": (-1.0, 1.0), "y": (-1.0, 1.0)})
     box = procedure.propose(question, Looked(CLOUD[:512], works))

@@ -10,8 +10,7 @@ import pytest
 from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 from skillframe_recordings.proposal.names import cut, groups_of, split_unit
-from skillframe_recordings.proposal.propose import Proposal
-from skillframe_recordings.proposal.reading import propose_reading
+from skillframe_recordings.proposal.reading import Proposal, propose_reading
 
 from skillframe.errors import InputError
 from skillframe.extend.reading import read_demonstration

@@ -22,16 +22,10 @@ from skillframe_certify.surrogate import Surrogate
 
 BUDGET = {1: 160, 2: 544, 3: 1024, 4: 2048}
 """Most trials of a search by dimension, enough to settle on the synthetic sets of tests/figures/test_searches.py."""
-BATCH = {1: 16, 2: 32, 3: 64, 4: 128}
-"""Points of a round by dimension, limited to an eighth of the budget. Smaller rounds may end before all of the set is
-found.
-"""
 EXPLORED = 4
 """Every EXPLORED-th point of a round continues the Sobol sequence."""
-CANDIDATES, CLOUD = 2048, 8192
+CANDIDATES = 2048
 CLOSE, RUNNING = 0.05, 2
-ISLANDS = 3.0
-"""Rule of three: with 95 % confidence, a region that n even points all miss has at most 3 / n of the volume."""
 
 
 class ToTry(NamedTuple):
@@ -66,7 +60,7 @@ Sobol = Callable[[int, int], Float]
 """Points first .. last - 1 of the exploratory Sobol sequence, (n, d)."""
 
 
-def cloud(dimension: int, count: int = CLOUD, seed: int = 0) -> Float:
+def cloud(dimension: int, count: int = 8192, seed: int = 0) -> Float:
     """Return (count, d) even points in the scaled ranges."""
     from scipy.stats import qmc
 
@@ -75,8 +69,11 @@ def cloud(dimension: int, count: int = CLOUD, seed: int = 0) -> Float:
 
 
 def batch_size(dimension: int, budget: int) -> int:
-    """Return the number of points of a round."""
-    return min(BATCH[dimension], max(EXPLORED, budget // 8 // EXPLORED * EXPLORED))
+    """Return the number of points of a round, at most an eighth of the budget.
+
+    Smaller rounds may end before all of the set is found.
+    """
+    return min({1: 16, 2: 32, 3: 64, 4: 128}[dimension], max(EXPLORED, budget // 8 // EXPLORED * EXPLORED))
 
 
 def search(

@@ -24,14 +24,12 @@ from skillframe_certify.engine import Looked, Say
 
 BUDGET = {1: 96, 2: 256, 3: 384, 4: 600, 5: 960, 6: 960}
 """Most trials of a search, by the number of quantities."""
-AGAIN, MOST_AGAIN = 8, 3
-"""Fresh trials at a point to confirm, and the most points that are tried, smallest first."""
+AGAIN = 8
+"""Fresh trials at a point to confirm."""
 INSIDE = 0.97
 """Share of the smallest radius so far at which a new ray is tried."""
 APART = np.cos(np.radians(30.0))
 PARENTS, CHILDREN = 3, 8
-FACTORS = (0.98, 0.94, 0.88, 0.98, 0.8, 0.98, 0.94, 0.65)
-"""Radii of a ray's children relative to its own."""
 BEGIN = 0.3
 """First and largest step of a ray's direction, whose length is 1."""
 POOL = 14
@@ -125,7 +123,7 @@ def search(
         parents, children = parents_of(rays), list[tuple[Float, float]]()
         for i, ray in enumerate(parents):
             rng = np.random.default_rng([number, i])
-            for k, factor in enumerate(FACTORS):
+            for k, factor in enumerate((0.98, 0.94, 0.88, 0.98, 0.8, 0.98, 0.94, 0.65)):  # of the ray's radius
                 way = ray.direction + (ray.step * rng.standard_normal(len(ray.direction)) if k else 0.0)
                 children.append((way / np.sqrt(np.sum(way**2)), factor * ray.radius))
         fails = yield from _tried(origin, children)

@@ -18,7 +18,6 @@ from skillframe.campaign import (
     CODE,
     COPIES,
     RESULTS,
-    CampaignSpec,
     RanAgain,
     Row,
     campaign_hash,
@@ -131,11 +130,16 @@ def statement(
     question, seen = read_question(folder), looked(folder, params, rounds)
     spec = load(folder / LOOK, params)
     subject = [*_files(folder / LOOK), folder / QUESTION]
+    if found is None:
+        noted = read_content(folder / LOOK, campaign_hash(spec), spec).environments
+        version = noted[-1].get("skillframe", "") if noted else ""
+    else:
+        version = str(found.claim["software"].get("skillframe", ""))
     predicate: dict[str, Any] = {
         "certified": found is not None and found.best is not None, "skill": spec.labels[0], "robot": spec.robot_name,
         "world": spec.world, "rate": question.rate, "declared": {k: list(v) for k, v in question.ranges.items()},
         "looked_at": {**seen.counts, "border_rounds": rounds},
-        "means": list(MEANS), "skillframe": _version(folder / LOOK, spec, found),
+        "means": list(MEANS), "skillframe": version,
         "fixed": dict(sorted(spec.fixed.items())), "duration_s": spec.duration_s,
     }  # fmt: skip
     for stream in told:
@@ -152,13 +156,6 @@ def _files(place: Path) -> list[Path]:
     if not (place / RESULTS).is_file():
         raise InputError(place, f"has no {RESULTS}", f"type skillframe campaign resume {place}")
     return [place / CAMPAIGN, *(place / name for name in file_hashes(place, COPIES)), place / RESULTS]
-
-
-def _version(look: Path, spec: CampaignSpec, found: Outcome | None) -> str:
-    if found is not None:
-        return str(found.claim["software"].get("skillframe", ""))
-    noted = read_content(look, campaign_hash(spec), spec).environments
-    return noted[-1].get("skillframe", "") if noted else ""
 
 
 def _tested(question: Question, found: Outcome, rows: list[Row]) -> dict[str, Any]:
@@ -225,7 +222,16 @@ def examine(folder: Path, params: type | None = None) -> Examined:
     named = tuple(stream for stream in TOLD if stream in given.predicate and (folder / FOUND[stream]).is_file())
     rounds = int(given.predicate["looked_at"]["border_rounds"]) if found is None else int(found.claim["border_rounds"])
     now = json.loads(json.dumps(statement(folder, found, params, rounds, named)))
-    return Examined(now["predicate"], (*_tables(folder, found, params), *_compared(content, now)))
+    wrong = _tables(folder, found, params)
+    told, meant = ({each["name"] for each in said["subject"]} for said in (content, now))
+    wrong += [f"the certificate leaves out {name}" for name in sorted(meant - told)]
+    wrong += [f"the certificate names {name}, which is none of its files" for name in sorted(told - meant)]
+    if told == meant and content["subject"] != now["subject"]:
+        wrong.append("the certificate names a file twice, or in another order")
+    says, follows = content["predicate"], now["predicate"]
+    other = sorted(key for key in says.keys() | follows.keys() if _plain(says, key) != _plain(follows, key))
+    wrong += [f"the figures do not follow from the trials: {', '.join(other)}"] if other else []
+    return Examined(now["predicate"], tuple(wrong))
 
 
 def _tables(folder: Path, found: Outcome | None, params: type | None) -> list[str]:
@@ -234,17 +240,6 @@ def _tables(folder: Path, found: Outcome | None, params: type | None) -> list[st
         f"{(place / RESULTS).relative_to(folder)} does not follow from the rows beside it" for place in places
         if (place / RESULTS).read_bytes() != results_text(load(place, params), rows_of_campaign(place, params)).encode()
     ]  # fmt: skip
-
-
-def _compared(told: dict[str, Any], now: dict[str, Any]) -> list[str]:
-    names, meant = ({each["name"] for each in content["subject"]} for content in (told, now))
-    wrong = [f"the certificate leaves out {name}" for name in sorted(meant - names)]
-    wrong += [f"the certificate names {name}, which is none of its files" for name in sorted(names - meant)]
-    if not wrong and told["subject"] != now["subject"]:
-        wrong = ["the certificate names a file twice, or in another order"]
-    says, follows = told["predicate"], now["predicate"]
-    other = sorted(key for key in says.keys() | follows.keys() if _plain(says, key) != _plain(follows, key))
-    return wrong + ([f"the figures do not follow from the trials: {', '.join(other)}"] if other else [])
 
 
 def _plain(values: dict[str, Any], key: str) -> str:

@@ -24,8 +24,6 @@ from skillframe_certify.box import Box
 
 SHARES = (0.7, 0.85, 1.0)
 """Volumes of the nested boxes relative to the largest; the smallest still holds enough trials to pass."""
-MARGIN, POWER = 5.0, 0.95
-"""Trials are planned so that a skill with a failure rate MARGIN times below the limit passes with probability POWER."""
 
 
 class Tested(NamedTuple):
@@ -69,15 +67,15 @@ def most_failures(trials: int, rate: float, alpha: float) -> int:
 def fresh_trials(rate: float, alpha: float) -> int:
     """Return the number of trials to sample in the largest box.
 
-    The smallest box's share of them passes with probability `POWER` if failures are `MARGIN` times rarer than allowed.
+    The smallest box's share of them passes with probability 0.95 if failures are 5 times rarer than allowed.
     """
     from scipy.stats import binom
 
-    good = (1.0 - rate) / MARGIN
+    good = (1.0 - rate) / 5.0
     low, high = 1, 100_000
     while low < high:  # power rises with n up to small saw-teeth, which cost a trial or two
         middle = (low + high) // 2
-        if binom.cdf(most_failures(middle, rate, alpha), middle, good) >= POWER:
+        if binom.cdf(most_failures(middle, rate, alpha), middle, good) >= 0.95:
             high = middle
         else:
             low = middle + 1

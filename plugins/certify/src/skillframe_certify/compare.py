@@ -144,7 +144,11 @@ def compare(trials: Trials, alpha: float = 0.05, better: int = 0) -> Judgement:
         better: 0 compares successes, 1 scores (higher is better), -1 scores (lower is better).
     """
     ran = {policy: [row for row in trials.rows if row.policy == policy] for policy in trials.policies}
-    order = sorted(trials.policies, key=lambda policy: _rank(ran[policy], better))
+    if better:
+        ranks = {policy: -better * float(np.median([row.score for row in rows])) for policy, rows in ran.items()}
+    else:
+        ranks = {policy: -sum(row.success for row in rows) / len(rows) for policy, rows in ran.items()}
+    order = sorted(trials.policies, key=lambda policy: ranks[policy])
     names = list(combinations(order, 2))
     evidence = [evidence_of(trials, first, second, better) for first, second in names]
     rows, corrected = holm_of_minima(evidence, len(trials.rows))
@@ -154,14 +158,13 @@ def compare(trials: Trials, alpha: float = 0.05, better: int = 0) -> Judgement:
         for k, ((first, second), found) in enumerate(zip(names, evidence, strict=True))
     )
     marks = letters(order, [(pair.first, pair.second) for pair in pairs if pair.better])
-    standings = tuple(_standing(policy, ran[policy], marks[policy], bool(better)) for policy in order)
-    return Judgement(standings=standings, pairs=pairs, alpha=alpha, doubts=trials.doubts)
-
-
-def _rank(ran: Sequence[Trial], better: int) -> float:
-    if better:
-        return -better * float(np.median([row.score for row in ran]))
-    return -sum(row.success for row in ran) / len(ran)
+    standings = []
+    for policy in order:
+        won, count = sum(row.success for row in ran[policy]), len(ran[policy])
+        interval = confidence_sequence(won, count)
+        quartiles = np.quantile([row.score for row in ran[policy]], (0.25, 0.5, 0.75)).tolist() if better else []
+        standings.append(Ranked(policy, count, won, interval.low, interval.high, marks[policy], tuple(quartiles)))
+    return Judgement(standings=tuple(standings), pairs=pairs, alpha=alpha, doubts=trials.doubts)
 
 
 def evidence_of(trials: Trials, first: str, second: str, better: int = 0) -> Evidence:
@@ -203,13 +206,6 @@ def holm_of_minima(evidence: Sequence[Evidence], rows: int) -> tuple[NDArray[np.
     corrected = np.empty_like(minima)
     np.put_along_axis(corrected, order, stepped, axis=1)
     return looks, corrected
-
-
-def _standing(policy: str, ran: Sequence[Trial], marks: str, scored: bool) -> Ranked:
-    won = sum(row.success for row in ran)
-    interval = confidence_sequence(won, len(ran))
-    quartiles = np.quantile([row.score for row in ran], (0.25, 0.5, 0.75)).tolist() if scored else []
-    return Ranked(policy, len(ran), won, interval.low, interval.high, marks, tuple(quartiles))
 
 
 def _pair(

@@ -62,8 +62,6 @@ MOST_CLAIMS = 4
 """Most claims of a folder; together their false-claim probability is at most 1.875 times the level."""
 SLACK = 4.0
 """A proposed box may hold predicted failures of a SLACK-th of what the rate allows."""
-LIKELY = 0.8
-"""Predicted success probability above which a place counts as working. Lower values certify fewer boxes."""
 
 
 def look(folder: Path, engine: Engine, notify: Notify | None = None) -> None:
@@ -81,7 +79,7 @@ def propose(question: Question, seen: Looked) -> Box | None:
         ones = np.ones(len(question.ranges))
         return Box(-ones, ones)
     even = cloud(len(question.ranges))
-    predicted = Surrogate(seen.points, seen.works).success(even) > LIKELY
+    predicted = Surrogate(seen.points, seen.works).success(even) > 0.8  # lower values certify fewer boxes
     return peel(even, predicted, (1.0 - question.rate) / SLACK)
 
 
@@ -147,7 +145,10 @@ def write_claim(folder: Path, question: Question, box: Box, params: type, entrop
             "improve the skill; a new folder for the same skill would hide that these claims failed",
         )  # fmt: skip
     alpha = level(question, number)
-    boxes = [_in_si(question, each) for each in family(box)]
+    boxes = list[dict[str, list[float]]]()
+    for each in family(box):
+        low, high = question.in_si(each.low), question.in_si(each.high)
+        boxes.append({name: [float(low[i]), float(high[i])] for i, name in enumerate(question.ranges)})
     spec = load(folder / LOOK, params)
     place = folder / f"claim{number}"
     if (place / FRESH).exists():
@@ -215,8 +216,3 @@ def box_of(content: Mapping[str, Any], names: list[str]) -> Box:
     """Return a claim's box as a box in SI."""
     ends = np.array([content[name] for name in names], dtype=float)
     return Box(ends[:, 0], ends[:, 1])
-
-
-def _in_si(question: Question, box: Box) -> dict[str, list[float]]:
-    low, high = question.in_si(box.low), question.in_si(box.high)
-    return {name: [float(low[i]), float(high[i])] for i, name in enumerate(question.ranges)}

@@ -27,8 +27,6 @@ MOST_MAPPED = 4
 """Most ranges of a border, a box or a ranking; a breaking point may have as many as `LOOKS` names."""
 USUAL = 0.95
 """Default rate and confidence."""
-NORMAL = 2.0
-"""Standard deviations to either side that the range of a normal axis covers."""
 FIX = "start again with skillframe certify run FILE.toml --out FOLDER"
 
 
@@ -94,7 +92,7 @@ def begin(
             ranges[name] = (float(axis.numbers[0]), float(axis.numbers[1]))
         elif axis.kind == "normal":
             mean, spread = float(axis.numbers[0]), float(axis.numbers[1])
-            ranges[name] = (mean - NORMAL * spread, mean + NORMAL * spread)
+            ranges[name] = (mean - 2.0 * spread, mean + 2.0 * spread)  # two standard deviations to either side
         elif axis.kind != "choice":
             raise InputError(
                 f"vary.{name}", f"is a {axis.kind} axis, which has no fresh samples",

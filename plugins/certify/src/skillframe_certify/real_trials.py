@@ -82,8 +82,18 @@ class RealTable:
         expected = self.next_trial(given.skill)
         trial = expected if given.trial is None else given.trial
         begins = not self.rows and trial in (0, 1)
-        if trial != expected and not begins:
-            raise InputError(where, *_out_of_order(given.skill, trial, expected))
+        if trial < expected and not begins:
+            raise InputError(
+                where,
+                f"is trial {trial} of {given.skill}, which is there already",
+                "a trial that is run again because of how it ended counts once: leave it out",
+            )
+        if trial > expected and not begins:
+            raise InputError(
+                where,
+                f"is trial {trial} of {given.skill}, but trial {expected} comes next",
+                "enter every trial, failed ones too: left out, they would make the skill look better",
+            )
         for text in (given.skill, given.failure):
             if any(mark in text for mark in "\r\n\0") or text != text.strip():
                 raise InputError(where, f"{text!r} does not fit on a line", "leave out line ends and blanks around it")
@@ -147,16 +157,6 @@ def check_names(names: Sequence[str]) -> None:
             raise InputError(
                 "draws", f"{name!r} cannot be the name of a sampled value", "the table uses it; choose another"
             )
-
-
-def _out_of_order(skill: str, trial: int, expected: int) -> tuple[str, str]:
-    if trial < expected:
-        return f"is trial {trial} of {skill}, which is there already", (
-            "a trial that is run again because of how it ended counts once: leave it out"
-        )
-    return f"is trial {trial} of {skill}, but trial {expected} comes next", (
-        "enter every trial, failed ones too: left out, they would make the skill look better"
-    )
 
 
 def table_path(target: Path) -> Path:

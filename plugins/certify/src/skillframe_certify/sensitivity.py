@@ -24,8 +24,6 @@ from skillframe_certify.border import ToTry
 from skillframe_certify.engine import Looked, Say
 from skillframe_certify.surrogate import Surrogate
 
-TRIALS = 128
-
 
 class Frozen(NamedTuple):
     """Effect of fixing a quantity at its nominal value.
@@ -92,8 +90,9 @@ def search(
     top = sorted((name for name in names if ranked[name] >= 0.05), key=lambda name: -ranked[name])[:2]
     if not top:
         return ()
-    points = 2.0 * np.random.default_rng(seed).random((TRIALS, len(names))) - 1.0
-    say(f"{TRIALS} fresh trials, then the same with {' and then '.join(top)} held; {TRIALS * (1 + len(top))} in all")
+    points = 2.0 * np.random.default_rng(seed).random((128, len(names))) - 1.0
+    count = len(points)
+    say(f"{count} fresh trials, then the same with {' and then '.join(top)} held; {count * (1 + len(top))} in all")
     drawn = yield ToTry(points, 0)
     held = []
     for name in top:

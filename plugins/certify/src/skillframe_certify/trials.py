@@ -27,7 +27,6 @@ STREAM = "stream"
 """Column that says how a row's parameters were chosen."""
 SAMPLED = ("", "fresh", "explore")
 """Streams that are random samples, unlike rows that a search picked."""
-LISTED = 5  # trial numbers that a sentence lists
 
 
 class Trial(NamedTuple):
@@ -79,7 +78,11 @@ def read_trials(path: Path, draws: Sequence[str] = (), score: str | None = None)
             and simulated trials are mixed, or a score is missing.
     """
     head, body, torn = cells_of(path)
-    columns = {name: _place(path, head, name) for name in ("trial", "success", *draws, *([score] if score else []))}
+    columns = dict[str, int]()
+    for name in ("trial", "success", *draws, *([score] if score else [])):
+        if name not in head:
+            raise InputError(path, f"has no column {name}", f"its columns are {', '.join(head)}")
+        columns[name] = head.index(name)
     policy = next((head.index(name) for name in POLICY if name in head), None)
     if policy is None:
         raise InputError(path, "has no column policy", f"call one of its columns {', '.join(POLICY)}")
@@ -152,12 +155,6 @@ def cells_of(path: Path) -> tuple[list[str], list[tuple[int, list[str]]], bool]:
         if len(cells) != len(head):
             raise InputError(f"{path}: row {n}", f"has {len(cells)} cells, the header {len(head)}", "fix that row")
     return head, body, torn
-
-
-def _place(path: Path, head: list[str], name: str) -> int:
-    if name not in head:
-        raise InputError(path, f"has no column {name}", f"its columns are {', '.join(head)}")
-    return head.index(name)
 
 
 def success_of(path: Path, number: int, cell: str) -> bool:
@@ -235,6 +232,6 @@ def _doubts(
 
 
 def _named(trials: Sequence[str]) -> str:
-    shown = ", ".join(trials[:LISTED])
-    more = f" and {len(trials) - LISTED} more" if len(trials) > LISTED else ""
+    shown, left = ", ".join(trials[:5]), len(trials) - 5
+    more = f" and {left} more" if left > 0 else ""
     return f"trial {shown}" if len(trials) == 1 else f"trials {shown}{more}"

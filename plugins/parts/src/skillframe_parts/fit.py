@@ -23,10 +23,7 @@ TOUCH = OVERLAP
 """Distance below which parts are checked for overlap, and tolerance between parts of a fixture [m]."""
 NEAR = 8e-4
 """Sideways distance [m] from the held part within which material belongs to the hole entrance."""
-FLAT_SIDES = 12
-"""Sides of a part whose normals are tried as ways out, twice those of a box."""
 Axis = tuple[float, float, float]
-_AXES = ((0, 0, -1), (0, 0, 1), (-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0))
 
 
 class WayOut(NamedTuple):
@@ -180,7 +177,8 @@ def _axis(
     """Rotation of the given or first free axis to down, and the axis. Tried: six axes, then normals of the plug."""
     given = file.task.axis
     blocked = []
-    for axis in (*_AXES, *face_normals(one)) if given == "auto" else (given,):
+    six = ((0, 0, -1), (0, 0, 1), (-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0))
+    for axis in (*six, *face_normals(one)) if given == "auto" else (given,):
         along = np.array(axis, dtype=float) / np.linalg.norm(axis)
         turn = _down(along)
         there, way = (_turned(one, turn), _turned(two, turn)), WayOut()
@@ -210,7 +208,7 @@ def face_normals(solid: Any) -> list[Axis]:
     same = np.round(raw / size, 3)  # normals within some 0.05 degrees
     _, first, side = np.unique(same, axis=0, return_index=True, return_inverse=True)
     area = np.bincount(side.ravel(), weights=size.ravel())
-    some = first[np.argsort(-area)[:FLAT_SIDES]]
+    some = first[np.argsort(-area)[:12]]  # the largest, twice those of a box
     return [(float(x), float(y), float(z)) for x, y, z in raw[some] / size[some]]
 
 

@@ -17,10 +17,6 @@ from numpy.typing import NDArray
 from skillframe.frames import Float, cross, norm
 from skillframe_parts.polygons import area_vector, cut
 
-WIDEST = 0.2
-"""Largest width of a closed hole, as a share of the part's size."""
-SMALL = 0.05
-"""Largest area of a removed sheet, as a share of the part's."""
 _FLAT = 1e-6  # of the part's size
 Faces = NDArray[np.int64]
 
@@ -76,9 +72,10 @@ def mended(vertices: Float, faces: Faces) -> Mended:
     turns = np.bincount(edges.of.reshape(-1), weights=forward.reshape(-1), minlength=len(edges.shared))
     if (edges.shared == 2).all() and not turns.any():
         return Mended(vertices, faces, (), ())
-    faces, doubled = _single(faces)
-    if doubled:
-        notes.append(f"doubled triangles left out: {doubled}")
+    kept = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]
+    if len(kept) < len(faces) and edges_of(faces[kept]).odd <= edges_of(faces).odd:  # else it would open the mesh
+        notes.append(f"doubled triangles left out: {len(faces) - len(kept)}")
+        faces = faces[np.sort(kept)]
     faces, split = _split(vertices, faces)
     if split:
         notes.append(f"edges split at corners that lie on them: {split}")
@@ -102,14 +99,6 @@ def _said(places: list[Mend]) -> str:
     widest = max(float(_extents(place.points)[0]) for place in places)
     error = round(1000.0 * max(place.error for place in places), 4)
     return f"largest {1000.0 * widest:.2g} mm; the surface may be off by {error:.2g} mm there"
-
-
-def _single(faces: Faces) -> tuple[Faces, int]:
-    """Triangles without duplicates, and their number, unless removing opens the mesh."""
-    kept = np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]
-    if len(kept) == len(faces) or edges_of(faces[kept]).odd > edges_of(faces).odd:
-        return faces, 0
-    return faces[np.sort(kept)], len(faces) - len(kept)
 
 
 def _split(vertices: Float, faces: Faces) -> tuple[Faces, int]:
@@ -161,7 +150,7 @@ def _without_sheets(vertices: Float, faces: Faces) -> tuple[Faces, list[Mend]]:
     from scipy.sparse.csgraph import connected_components
 
     left, gone = faces, []
-    largest = SMALL * float(_areas(vertices, faces).sum())
+    largest = 0.05 * float(_areas(vertices, faces).sum())
     while (edges := edges_of(left)).odd:
         one, two, _ = _neighbours(edges)
         links = coo_matrix((np.ones(len(one)), (one, two)), shape=[len(left)] * 2)
@@ -243,7 +232,7 @@ def _closed(vertices: Float, faces: Faces) -> tuple[Faces, list[Mend]]:
     caps, places = [faces], []
     for loop in _loops(vertices, sorted(beside)):
         points = vertices[loop]
-        if _extents(points)[1] > WIDEST * size:
+        if _extents(points)[1] > 0.2 * size:  # too wide to close
             continue
         around = [beside[edge] for edge in zip(loop, [*loop[1:], loop[0]], strict=True)]
         caps.append(np.array(loop)[cut(points)])

@@ -28,12 +28,20 @@ _LIBRARIES = ("manifold3d", "numpy", "scipy")
 def pieces_of(solid: Any, allowed: float, most: int = pieces.MOST_PIECES) -> ConvexPieces:
     """`pieces.pieces_of`, from the cache if possible."""
     file = cache_dir("pieces") / f"{_key(solid, allowed, most)}.json"
-    found = _read(file) if file.exists() else None
-    if found is None:
-        found = pieces.pieces_of(solid, allowed, most)
-        hulls = [[h.vertices.tolist(), h.faces.tolist(), h.planes.tolist(), h.volume] for h in found.hulls]
-        plain = {"hulls": hulls, "error": found.error, "axis": found.axis, "thinned": found.thinned}
-        write_whole(file, json.dumps(plain).encode())
+    if file.exists():
+        try:
+            plain = json.loads(file.read_bytes())
+            hulls = [
+                Hull(_rows(vertices, 3), _rows(faces, 3, np.int64), _rows(planes, 4), float(volume))
+                for vertices, faces, planes, volume in plain["hulls"]
+            ]
+            return ConvexPieces(hulls, float(plain["error"]), str(plain["axis"]), bool(plain["thinned"]))
+        except (OSError, ValueError, KeyError, TypeError):
+            warnings.warn(f"{file} was damaged, so the part was cut again", SkillframeWarning, stacklevel=1)
+    found = pieces.pieces_of(solid, allowed, most)
+    rows = [[h.vertices.tolist(), h.faces.tolist(), h.planes.tolist(), h.volume] for h in found.hulls]
+    plain = {"hulls": rows, "error": found.error, "axis": found.axis, "thinned": found.thinned}
+    write_whole(file, json.dumps(plain).encode())
     return found
 
 
@@ -45,19 +53,6 @@ def _key(solid: Any, allowed: float, most: int) -> str:
     for module in _CODE:
         whole.update(Path(str(module.__file__)).read_bytes())
     return whole.hexdigest()[:32]
-
-
-def _read(file: Path) -> ConvexPieces | None:
-    try:
-        plain = json.loads(file.read_bytes())
-        hulls = [
-            Hull(_rows(vertices, 3), _rows(faces, 3, np.int64), _rows(planes, 4), float(volume))
-            for vertices, faces, planes, volume in plain["hulls"]
-        ]
-        return ConvexPieces(hulls, float(plain["error"]), str(plain["axis"]), bool(plain["thinned"]))
-    except (OSError, ValueError, KeyError, TypeError):
-        warnings.warn(f"{file} was damaged, so the part was cut again", SkillframeWarning, stacklevel=2)
-        return None
 
 
 def _rows(values: Any, width: int, kind: Any = np.float64) -> Any:

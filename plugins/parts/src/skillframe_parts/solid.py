@@ -31,7 +31,7 @@ SIDES = 64
 FORMATS = (".stl", ".obj", ".ply", ".off", ".glb", *step.ENDINGS)
 SMALLEST, LARGEST = 1e-3, 2.0
 """Plausible sizes of parts [m]."""
-MOST_TRIANGLES, THINNED_BY = 40_000, 2e-6
+MOST_TRIANGLES = 40_000
 _CHANGED = 0.01  # reported change of volume
 Faces = NDArray[np.int64]
 
@@ -94,8 +94,8 @@ def read_part(path: Path, units: str | None, held: bool = False) -> MeshPart:
         left_out = (f"{path.name} was cut into triangles within {1e6 * step.TOLERANCE:g} um of what was drawn",)
     notes = (*left_out, *(f"{path.name}: {note}" for note in mesh.notes), *notes)
     if solid.num_tri() > MOST_TRIANGLES:
-        before, solid = solid.num_tri(), solid.simplify(THINNED_BY)
-        kept = f"{path.name} has {before:,} triangles; {solid.num_tri():,} are kept within {THINNED_BY * 1e6:g} um"
+        before, solid = solid.num_tri(), solid.simplify(2e-6)
+        kept = f"{path.name} has {before:,} triangles; {solid.num_tri():,} are kept within 2 um"
         notes = (*notes, kept)
     error = step.TOLERANCE if drawn else 0.0
     return MeshPart(path.name, solid, notes, hashlib.sha256(raw).hexdigest(), mesh.places, error)

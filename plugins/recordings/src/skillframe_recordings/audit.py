@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skillframe.demonstration import (
     COPY,
@@ -113,7 +112,11 @@ def audit(demonstration: Demonstration) -> DemonstrationAudit:
     dark = [s.stop for s in found if s.what != POSE]
     dark += [f.stop for f in wrong if f.kind == COPY and f.what != POSE]
     unseen = [c.start for c in contacts if any(0.0 <= c.start - stop < LEVEL_TIME for stop in dark)]
-    drift = _drift(d, contacts, level, live)
+    drift = None  # change of the free-air level, if both ends are in free air, at rest and sound
+    ends = (d.time <= d.time[0] + LEVEL_TIME) | (d.time >= d.time[-1] - LEVEL_TIME)
+    calm = contacts and d.time[-1] - contacts[-1].stop >= 2.0 * LEVEL_TIME and d.duration >= 4.0 * LEVEL_TIME
+    if calm and np.all(live[ends]):
+        drift = free_air_level(d.time, d.wrench, (float(d.time[-1]) - LEVEL_TIME, float(d.time[-1]))) - level
     # at 20 Hz, so that noise does not accumulate
     stride = max(1, min(round(d.rate / 20.0), len(d) // 2))
     pick = np.r_[np.arange(0, len(d) - 1, stride), len(d) - 1]
@@ -154,16 +157,6 @@ def audit(demonstration: Demonstration) -> DemonstrationAudit:
     )  # fmt: skip
 
 
-def _drift(d: Demonstration, contacts: list[Contact], level: Float, live: NDArray[np.bool_]) -> Float | None:
-    """Change of the free-air level, or None if either end is in contact, moving or stalled."""
-    if not np.all(live[(d.time <= d.time[0] + LEVEL_TIME) | (d.time >= d.time[-1] - LEVEL_TIME)]):
-        return None
-    if not contacts or d.time[-1] - contacts[-1].stop < 2.0 * LEVEL_TIME or d.duration < 4.0 * LEVEL_TIME:
-        return None
-    last = free_air_level(d.time, d.wrench, (float(d.time[-1]) - LEVEL_TIME, float(d.time[-1])))
-    return last - level
-
-
 def _wrench_warnings(
     d: Demonstration, noise: NoiseFigures, level: Float, drift: Float | None, contacts: list[Contact]
 ) -> list[str]:
@@ -201,15 +194,11 @@ def _cure(d: Demonstration) -> str:
 
 def compared(demonstrations: list[Demonstration], audits: list[DemonstrationAudit]) -> list[DemonstrationAudit]:
     """Return audits with warnings about the set: duplicates, and odd directions."""
-    said = zip(audits, _repeats(demonstrations), _odd_ways(demonstrations), strict=True)
-    return [dataclasses.replace(a, warnings=[*a.warnings, *filter(None, texts)]) for a, *texts in said]
-
-
-def _repeats(demonstrations: list[Demonstration]) -> list[str]:
-    """A sentence for each recording that has the samples of an earlier one."""
     columns = [np.concatenate([d.position, d.quaternion, d.wrench], axis=1) for d in demonstrations]
     twins = [next(i for i in range(k + 1) if np.array_equal(columns[i], own)) for k, own in enumerate(columns)]
-    return [f"repeated: the same samples as {demonstrations[i].source}" * (i != k) for k, i in enumerate(twins)]
+    repeats = [f"repeated: the same samples as {demonstrations[i].source}" * (i != k) for k, i in enumerate(twins)]
+    said = zip(audits, repeats, _odd_ways(demonstrations), strict=True)
+    return [dataclasses.replace(a, warnings=[*a.warnings, *filter(None, texts)]) for a, *texts in said]
 
 
 def _odd_ways(demonstrations: list[Demonstration]) -> list[str]:

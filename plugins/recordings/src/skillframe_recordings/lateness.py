@@ -77,14 +77,13 @@ def lateness(demonstration: Demonstration, live: NDArray[np.bool_] | None = None
     return found if agree else None
 
 
-def lateness_shares(demonstration: Demonstration, live: NDArray[np.bool_] | None = None) -> Float:
+def lateness_shares(demonstration: Demonstration) -> Float:
     """Return s(d) (71,) for shifts d from -0.7 to 0.7 s, empty without motion or force changes.
 
     Args:
         demonstration: as read, 4 s or longer.
-        live: (T,) valid sensor samples; None detects them.
     """
-    compared = _compared(demonstration, live)
+    compared = _compared(demonstration, None)
     return np.zeros(0) if compared is None else _shares(*compared)
 
 

@@ -173,14 +173,14 @@ def _landed(d: Demonstration, first: int, last: int, sigma: float) -> bool:
     before = d.wrench[max(first - 2 - AUDIT.level_rows, 0) : max(first - 2, 1), :3]
     low, high = max(first - 3, 0), min(last + 4, len(d.time))
     pulse = d.wrench[low:high, :3] - np.median(before, axis=0)
-    peak = float(norm(pulse).max())
-    if _width(norm(pulse)) >= AUDIT.resolved or _change(d, first, last) > max(
-        AUDIT.level_change_n, AUDIT.level_change * peak
-    ):
-        return True
     size = norm(pulse)
-    core = np.flatnonzero(size >= AUDIT.core * size.max())
-    least = max(AUDIT.flank * float(size.max()), AUDIT.flank_sigmas * sigma)
+    peak = float(size.max())
+    at, below = int(np.argmax(size)), np.flatnonzero(size < 0.5 * peak)
+    width = below[below > at].min(initial=len(size)) - below[below < at].max(initial=-1) - 1  # above half of the peak
+    if width >= AUDIT.resolved or _change(d, first, last) > max(AUDIT.level_change_n, AUDIT.level_change * peak):
+        return True
+    core = np.flatnonzero(size >= AUDIT.core * peak)
+    least = max(AUDIT.flank * peak, AUDIT.flank_sigmas * sigma)
     sides = (int(core[0]) - 1, int(core[-1]) + 1)
     return any(0 <= i < len(size) and least <= size[i] for i in sides) and _stops(d, first, last, pulse.sum(axis=0))
 
@@ -193,14 +193,6 @@ def _change(d: Demonstration, first: int, last: int) -> float:
     if min(len(before), len(after)) < 3:
         return 0.0
     return float(norm(np.median(after, axis=0) - np.median(before, axis=0)))
-
-
-def _width(size: Float) -> int:
-    """Consecutive samples around the maximum of (T,) above half of it."""
-    peak = int(np.argmax(size))
-    low = np.flatnonzero(size < 0.5 * size[peak])
-    before, after = low[low < peak].max(initial=-1), low[low > peak].min(initial=len(size))
-    return int(after - before) - 1
 
 
 def _stops(d: Demonstration, first: int, last: int, force: Float) -> bool:

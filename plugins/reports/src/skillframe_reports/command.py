@@ -31,11 +31,21 @@ def command(inputs: tuple[Path, ...], out: Path, watch: bool, as_json: bool) -> 
       skillframe report run1.npz run2.npz --out runs.html
       skillframe report results/peg --out peg.html --watch
     """
-    from skillframe.cli import emit_json
+    from skillframe.cli import emit_json, note, terminable
     from skillframe_reports.page import anchor_of, write_chapters
     from skillframe_reports.sources import read_chapters, scenes
 
-    code = _watched(inputs, out) if watch else 0
+    code = 0
+    if watch:
+        from skillframe_reports.watch import watch_report
+
+        with terminable() as interrupted:
+            try:
+                watch_report(inputs, out, note)
+            except KeyboardInterrupt:
+                kept = f"stopped watching; {out} keeps what is there now, and the campaign goes on by itself"
+                click.echo(kept, err=True)
+                code = interrupted()
     chapters = read_chapters(inputs)
     size, seen = write_chapters(chapters, out), [scenes(chapter) for chapter in chapters]
     first = [(each.kind.title.lower(), each.content) for each in chapters if each.kind is not None]
@@ -55,17 +65,3 @@ def command(inputs: tuple[Path, ...], out: Path, watch: bool, as_json: bool) -> 
     for name, _ in first[:1]:
         click.echo(f"{name}: {out}#{anchor_of(name, 1)}")
     return code
-
-
-def _watched(inputs: tuple[Path, ...], out: Path) -> int:
-    """Update the page until every campaign has ended and return the exit code of an interruption."""
-    from skillframe.cli import note, terminable
-    from skillframe_reports.watch import watch_report
-
-    with terminable() as code:
-        try:
-            watch_report(inputs, out, note)
-        except KeyboardInterrupt:
-            click.echo(f"stopped watching; {out} keeps what is there now, and the campaign goes on by itself", err=True)
-            return code()
-    return 0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -35,7 +34,10 @@ def lead(chapter: Chapter) -> Markup:
         how = tag("strong", "succeeded" if won else "did not succeed")
         return tag("p", "This run ", how, f": {reason}." if reason else ".", class_="lead")
     first, *others = results.skills
-    words: list[object] = [*_claim(results, first), f" with {first}", _origin(chapter.skills.get(first)), "."]
+    sources = (chapter.skills.get(first) or {}).get("learned_from")
+    count = len(sources) if isinstance(sources, list) else 0
+    taught = f", learned from {'one demonstration' if count == 1 else f'{count} demonstrations'}" if count else ""
+    words: list[object] = [*_claim(results, first), f" with {first}", taught, "."]
     for skill in others:
         words += [" On the same samples, ", *_claim(results, skill), f" with {skill}."]
     lines = next((found for d in chapter.skills.values() if (found := described(d)[0])), [])
@@ -69,30 +71,24 @@ def _claim(results: Results, skill: str) -> list[object]:
     ]
 
 
-def _origin(document: dict[str, Any] | None) -> str:
-    sources = (document or {}).get("learned_from")
-    if not isinstance(sources, list) or not sources:
-        return ""
-    return f", learned from {'one demonstration' if len(sources) == 1 else f'{len(sources)} demonstrations'}"
-
-
 def ranges(chapter: Chapter, results: Results) -> list[str]:
     """Return each varied quantity with its declared range, else that of its trials."""
-    return [_range(results, name, table_of(chapter.spec, "vary").get(name)) for name in results.varied]
-
-
-def _range(results: Results, name: str, declared: object) -> str:
-    q = quantity(name)
-    try:
-        axis = parse_axis(declared, name)
-    except InputError:
-        axis = None
-    if axis is not None and axis.kind in ("uniform", "sobol"):
-        low, high = (number(q.factor * float(end), 3) for end in axis.numbers)
-        return f"{q.label} {low} to {high} {q.unit}".strip()
-    values = [q.factor * row.values.get(name, math.nan) for row in results.rows]
-    finite = [v for v in values if math.isfinite(v)]
-    return f"{q.label} sampled from {number(min(finite), 2)} to {number(max(finite), 2)} {q.unit}".strip()
+    said = []
+    for name in results.varied:
+        q = quantity(name)
+        try:
+            axis = parse_axis(table_of(chapter.spec, "vary").get(name), name)
+        except InputError:
+            axis = None
+        if axis is not None and axis.kind in ("uniform", "sobol"):
+            low, high = (number(q.factor * float(end), 3) for end in axis.numbers)
+            said.append(f"{q.label} {low} to {high} {q.unit}".strip())
+        else:
+            values = [q.factor * row.values.get(name, math.nan) for row in results.rows]
+            finite = [v for v in values if math.isfinite(v)]
+            span = f"{number(min(finite), 2)} to {number(max(finite), 2)} {q.unit}"
+            said.append(f"{q.label} sampled from {span}".strip())
+    return said
 
 
 def _tile(results: Results, skill: str, index: int) -> Markup:

@@ -123,7 +123,10 @@ def _picture(child: subprocess.Popen[bytes], width: int, height: int) -> Image |
 def _write_scene(
     file: Path, stage: Stage, samples: Sequence[int], cameras: Sequence[tuple[Camera, int]], height: int
 ) -> None:
-    parts = [(body, part) for body in range(len(stage.names)) for part in _of_one_color(_shown(stage, body))]
+    shown = zip(stage.meshes, stage.cut, strict=True)
+    parts = [
+        (body, part) for body, (whole, cut) in enumerate(shown) for part in _of_one_color(whole if cut is None else cut)
+    ]
     arrays: dict[str, Any] = {}
     for i, (_, part) in enumerate(parts):
         arrays |= {f"vertices_{i}": part.vertices, f"normals_{i}": part.normals, f"faces_{i}": part.faces}
@@ -136,11 +139,6 @@ def _write_scene(
         quaternion=stage.quaternion[frames][:, bodies],
         cameras=np.array(rows, dtype=float), height=height, field_of_view=cameras[0][0].field_of_view, **arrays,
     )  # fmt: skip
-
-
-def _shown(stage: Stage, body: int) -> Mesh:
-    cut = stage.cut[body]
-    return stage.meshes[body] if cut is None else cut
 
 
 def _of_one_color(mesh: Mesh) -> Iterator[Mesh]:

@@ -13,8 +13,6 @@ from typing import Any
 
 import numpy as np
 
-PAPER = (250 / 255, 250 / 255, 251 / 255)
-
 
 def scene_model(meshes: list[dict[str, Any]], size: tuple[int, int], field_of_view: float) -> Any:
     """Return a model with one movable, never simulated body per mesh.
@@ -32,9 +30,10 @@ def scene_model(meshes: list[dict[str, Any]], size: tuple[int, int], field_of_vi
     spec.visual.headlight.ambient, spec.visual.headlight.diffuse = [0.35] * 3, [0.45] * 3
     spec.visual.headlight.specular = [0.1] * 3
     spec.visual.map.znear = 0.001
+    paper = [level / 255 for level in (250, 250, 251)]  # `raster.PAPER`
     spec.add_texture(
         name="paper", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX, builtin=mujoco.mjtBuiltin.mjBUILTIN_FLAT,
-        rgb1=PAPER, rgb2=PAPER, width=32, height=32,
+        rgb1=paper, rgb2=paper, width=32, height=32,
     )  # fmt: skip
     sun = spec.worldbody.add_light(pos=[0.5, -1.0, 2.5], dir=[-0.2, 0.4, -1.0], diffuse=[0.35] * 3, castshadow=False)
     sun.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL

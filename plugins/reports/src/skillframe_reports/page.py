@@ -130,24 +130,33 @@ def render(chapters: Sequence[Chapter], *, live: bool = False) -> str:
     names = [
         f"{n} ({c.folder})" if names.count(n) > 1 and c.folder else n for n, c in zip(names, chapters, strict=True)
     ]
-    bodies = [
-        _chapter(chapter, name, i, scenes, alone=len(chapters) == 1)
-        for i, (chapter, name) in enumerate(zip(chapters, names, strict=True), start=1)
-    ]
-    title = chapters[0].name if len(chapters) == 1 else "skillframe report"
+    alone, bodies = len(chapters) == 1, []
+    for i, (chapter, name) in enumerate(zip(chapters, names, strict=True), start=1):
+        hero = tag(
+            "header", tag("p", "Report" if alone else f"Chapter {i}", class_="eyebrow"), tag("h1", name),
+            banner(chapter) if chapter.kind is None else "",
+            tag("div", tag("div", lead(chapter)), cover(chapter), class_="opening"), tiles(chapter), class_="hero",
+        )  # fmt: skip
+        notes = [note(text) for text in chapter.notes]
+        found = sections_of(Page(chapter, f"c{i}", scenes))
+        sections = [tag("section", tag("h2", each.title), each.body, id=f"c{i}-{each.name}") for each in found]
+        kind = chapter.kind
+        first = tag("div", Markup(kind.page(chapter)), id=anchor_of(kind.title, i)) if kind is not None else ""
+        bodies.append(tag("div", first, hero, *notes, *sections, class_="chapter", id=f"c{i}"))
+    title = chapters[0].name if alone else "skillframe report"
     again = tag("meta", http_equiv="refresh", content="5") if live else ""
     titles = [(i, chapter.kind.title) for i, chapter in enumerate(chapters, start=1) if chapter.kind is not None]
     links = [
         tag("a", title if len(titles) == 1 else f"{title} {i}", href=f"#{anchor_of(title, i)}") for i, title in titles
     ]
-    if len(chapters) == 1:
-        links += [tag("a", section.title, href=f"#c1-{section.name}") for section in bodies[0].sections]
+    if alone:
+        links += [tag("a", section.title, href=f"#c1-{section.name}") for section in found]
     else:
         links += [tag("a", name, href=f"#c{i}") for i, name in enumerate(names, start=1)]
     body = tag(
         "body",
         bar(links),
-        tag("main", note(LIVE, role="status") if live else "", *(each.text for each in bodies)),
+        tag("main", note(LIVE, role="status") if live else "", *bodies),
         tag("footer", "Made by skillframe from files alone. Forces: environment on tool. Intervals are two-sided."),
         tag("noscript", note("Without scripts the 3-D replay does not move; stills and plots show the same run.")),
         *scenes.values(),
@@ -156,28 +165,7 @@ def render(chapters: Sequence[Chapter], *, live: bool = False) -> str:
     return "<!DOCTYPE html>\n" + tag("html", head(title, again), body, lang="en")
 
 
-class _Body(NamedTuple):
-    """HTML of a chapter, and its sections."""
-
-    text: Markup
-    sections: list[Section]
-
-
 def anchor_of(title: str, index: int) -> str:
     """Return the anchor of a chapter's first page."""
     name = title.lower()
     return name if index == 1 else f"{name}-{index}"
-
-
-def _chapter(chapter: Chapter, name: str, index: int, scenes: dict[str, Markup], alone: bool) -> _Body:
-    hero = tag(
-        "header", tag("p", "Report" if alone else f"Chapter {index}", class_="eyebrow"), tag("h1", name),
-        banner(chapter) if chapter.kind is None else "",
-        tag("div", tag("div", lead(chapter)), cover(chapter), class_="opening"), tiles(chapter), class_="hero",
-    )  # fmt: skip
-    notes = [note(text) for text in chapter.notes]
-    found = sections_of(Page(chapter, f"c{index}", scenes))
-    sections = [tag("section", tag("h2", each.title), each.body, id=f"c{index}-{each.name}") for each in found]
-    kind = chapter.kind
-    first = tag("div", Markup(kind.page(chapter)), id=anchor_of(kind.title, index)) if kind is not None else ""
-    return _Body(tag("div", first, hero, *notes, *sections, class_="chapter", id=f"c{index}"), found)

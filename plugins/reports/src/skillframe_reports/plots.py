@@ -57,9 +57,13 @@ def time_plot(
         shades(axes, time, shaded),
         *(axes.line(*envelope(time, c.values), c.stroke) for c in curves),
     ]
+    content.append(legend(axes, names))
+    if limit is not None and axes.inside(limit):
+        y = float(axes.up(limit))
+        beside = y - 5 if y - axes.top > 24.0 else y + 12  # the numbers of events are at the top
+        said = text(LEFT + 6, beside, f"limit {limit:g} {unit}", "limit-text", "start")
+        content += [axes.horizontal(limit, "limit"), said]
     content += [
-        legend(axes, names),
-        _limit_line(axes, limit, unit),
         _event_marks(axes, events),
         tag("line", x1=0, x2=0, y1=axes.top, y2=axes.bottom, class_="cursor"),
     ]
@@ -96,16 +100,6 @@ def doubted(columns: Mapping[str, Float]) -> NDArray[np.bool_] | None:
     return columns["force_valid"] < 0.5 if "force_valid" in columns else None
 
 
-def _limit_line(axes: Axes, limit: float | None, unit: str) -> Markup:
-    if limit is None or not axes.inside(limit):
-        return Markup("")
-    y = float(axes.up(limit))
-    beside = y - 5 if y - axes.top > 24.0 else y + 12  # the numbers of events are at the top
-    return join(
-        [axes.horizontal(limit, "limit"), text(LEFT + 6, beside, f"limit {limit:g} {unit}", "limit-text", "start")]
-    )
-
-
 def _event_marks(axes: Axes, events: Sequence[tuple[float, str]]) -> Markup:
     lines: list[Markup] = []
     labels: list[tuple[float, str]] = []
@@ -121,32 +115,29 @@ def _event_marks(axes: Axes, events: Sequence[tuple[float, str]]) -> Markup:
             labels = (
                 [*labels[:-1], (labels[-1][0], f"{labels[-1][1]}, {index}")] if together else [*labels, (x, f"{index}")]
             )
-    return join([*lines, *(_event_label(axes, x, label) for x, label in labels)])
-
-
-def _event_label(axes: Axes, x: float, label: str) -> Markup:
-    at_edge = x + 6.0 * len(label) > axes.right
-    return text(x - 3 if at_edge else x + 3, axes.top + 9, label, "event-text", "end" if at_edge else "start")
+    for x, label in labels:
+        at_edge = x + 6.0 * len(label) > axes.right
+        side, anchor = (-3, "end") if at_edge else (3, "start")
+        lines.append(text(x + side, axes.top + 9, label, "event-text", anchor))
+    return join(lines)
 
 
 def events_of(trace: Trace) -> list[tuple[float, str]]:
     """Return events of a trace as (time [s], text), in order."""
     pairs = [e for e in trace.meta.get("events") or [] if isinstance(e, list | tuple) and len(e) == 2]
     told = [(float(when), str(what)) for when, what in pairs if isinstance(when, int | float)]
-    return sorted(told or _read_off(trace))
-
-
-def _read_off(trace: Trace) -> list[tuple[float, str]]:
+    if told:
+        return sorted(told)
     time, force = np.asarray(trace.time, dtype=float), np.nan_to_num(norm(trace.wrench[:, :3]))
     # of a real run: 4 standard deviations of its sensor, which one of 16,000 samples of noise exceeds
     least = max(CONTACT_N, 4.0 * (trace.meta.get("sensor_noise_n") or 0.0))
     touching = np.flatnonzero(np.nan_to_num(norm(trace.wrench_true[:, :3])) > least)
-    events = [(float(time[touching[0]]), "first contact")] if len(touching) else []
+    told += [(float(time[touching[0]]), "first contact")] if len(touching) else []
     if force.max() > CONTACT_N:
         how = "estimated" if trace.estimated else "measured"
-        events.append((float(time[np.argmax(force)]), f"highest {how} force, {force.max():.0f} N"))
+        told.append((float(time[np.argmax(force)]), f"highest {how} force, {force.max():.0f} N"))
     reason = str(trace.meta.get("reason") or trace.meta.get("failure") or "")
-    return [*events, (float(time[-1]), f"the end: {reason}" if reason else "the end")]
+    return sorted([*told, (float(time[-1]), f"the end: {reason}" if reason else "the end")])
 
 
 def run_plots(trace: Trace, force_limit: float | None = None) -> list[Markup]:

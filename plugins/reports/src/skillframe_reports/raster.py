@@ -19,7 +19,6 @@ from skillframe_reports.shapes import Mesh
 from skillframe_reports.stage import Camera
 
 Image = NDArray[np.uint8]
-INK = np.array([0.13, 0.17, 0.22])
 PAPER = (250, 250, 251)
 OVERSAMPLE = 2
 NEAR = 1e-3
@@ -70,7 +69,7 @@ def picture(canvas: Canvas) -> Image:
     """Return the picture (height, width, 4) of an unchanged canvas, with outlines."""
     edge = _outline(canvas.depth, canvas.owner)
     color = canvas.color.copy()
-    color[edge] = INK
+    color[edge] = (0.13, 0.17, 0.22)  # ink
     solid = edge | (canvas.owner >= 0)
     places = [(slice(i, None, OVERSAMPLE), slice(j, None, OVERSAMPLE)) for i, j in np.ndindex(OVERSAMPLE, OVERSAMPLE)]
     count = np.sum([solid[place] for place in places], axis=0)

@@ -34,9 +34,19 @@ def scene_data(stage: Stage) -> dict[str, Any]:
 
 def run_data(trace: Trace, stage: Stage, scene: str) -> dict[str, Any]:
     """Return a run's poses, tip, desired tip and force per frame."""
-    times = frame_times(np.asarray(trace.time, dtype=float))
+    time = np.asarray(trace.time, dtype=float)
+    times = frame_times(time)
     poses = np.concatenate([stage.position, continuous(stage.quaternion)], axis=-1)
-    sample = _sampler(np.asarray(trace.time, dtype=float), times)
+    low = np.clip(np.searchsorted(time, times, side="right") - 1, 0, max(len(time) - 2, 0))
+    high = np.minimum(low + 1, len(time) - 1)
+    span = np.where(time[high] > time[low], time[high] - time[low], 1.0)
+    share = np.clip((times - time[low]) / span, 0.0, 1.0)
+
+    def sample(values: Float) -> Float:
+        weight = share.reshape(-1, *[1] * (np.ndim(values) - 1))
+        result: Float = np.nan_to_num(values[low]) * (1.0 - weight) + np.nan_to_num(values[high]) * weight
+        return result
+
     return {
         "scene": scene,
         "frames": len(times),
@@ -62,20 +72,6 @@ def frame_times(time: Float) -> Float:
     span = float(time[-1] - time[0])
     count = int(np.clip(np.ceil(span * 30.0), 1, MOST_FRAMES - 1)) + 1
     return np.linspace(time[0], time[-1], count)
-
-
-def _sampler(time: Float, times: Float) -> Any:
-    low = np.clip(np.searchsorted(time, times, side="right") - 1, 0, max(len(time) - 2, 0))
-    high = np.minimum(low + 1, len(time) - 1)
-    span = np.where(time[high] > time[low], time[high] - time[low], 1.0)
-    share = np.clip((times - time[low]) / span, 0.0, 1.0)
-
-    def sample(values: Float) -> Float:
-        weight = share.reshape(-1, *[1] * (np.ndim(values) - 1))
-        result: Float = np.nan_to_num(values[low]) * (1.0 - weight) + np.nan_to_num(values[high]) * weight
-        return result
-
-    return sample
 
 
 def _packed(mesh: Mesh) -> dict[str, Any]:

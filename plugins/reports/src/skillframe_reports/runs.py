@@ -82,7 +82,11 @@ def _story(meta: Mapping[str, Any]) -> str:
     if isinstance(meta.get("final_error_m"), int | float):
         facts.append(f"final error {_figure(1e3 * float(meta['final_error_m']))} mm")
     facts += [*second_parts(meta.get("second") or {}), *joint_shares(meta), *said_of(meta)]
-    drawn = [_draw_text(name, value) for name, value in sorted((meta.get("draws") or {}).items())]
+    drawn = []
+    for name, value in sorted((meta.get("draws") or {}).items()):
+        q, plain = quantity(name), isinstance(value, bool) or not isinstance(value, int | float)
+        amount = f"{value}" if plain else f"{number(q.factor * float(value))} {q.unit}".strip()
+        drawn.append(f"{q.label} {amount}")
     how = "Set for this run" if meta.get("trial") is None else "Sampled for this trial"
     return "; ".join(f for f in facts if f) + "." + (f" {how}: {', '.join(drawn)}." if drawn else "")
 
@@ -90,13 +94,6 @@ def _story(meta: Mapping[str, Any]) -> str:
 def _figure(value: float) -> str:
     """A figure. Values below a hundredth of its unit are beyond measurement."""
     return number(value) if value >= 0.01 or not math.isfinite(value) else "< 0.01"
-
-
-def _draw_text(name: str, value: Any) -> str:
-    if not isinstance(value, int | float) or isinstance(value, bool):
-        return f"{quantity(name).label} {value}"
-    q = quantity(name)
-    return f"{q.label} {number(q.factor * float(value))} {q.unit}".strip()
 
 
 def still_image(stage: Stage, frame: int, alt: str) -> Markup:

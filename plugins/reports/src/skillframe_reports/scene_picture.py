@@ -15,7 +15,6 @@ from skillframe_reports.raster import Image, draw, over_paper, png
 from skillframe_reports.shapes import Mesh, merge, mesh_of, section
 from skillframe_reports.stage import CLOSE, Camera, fitted
 
-WIDTH, HEIGHT = 640, 480
 Geoms = Sequence[Mapping[str, Any]]
 
 
@@ -28,8 +27,8 @@ def scene_picture(fixture: Geoms, tool: Geoms, place: Pose, reach: float = CLOSE
         place: of the tool frame in the fixture frame.
         reach: distance from the fixture's origin of what fills the picture [m].
     """
-    image = View(fixture, tool, place, reach).image(place, WIDTH, HEIGHT)
-    return png(np.concatenate([image, np.full((HEIGHT, WIDTH, 1), 255, np.uint8)], axis=-1))
+    image = View(fixture, tool, place, reach).image(place, 640, 480)
+    return png(np.concatenate([image, np.full((*image.shape[:2], 1), 255, np.uint8)], axis=-1))
 
 
 class View:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from itertools import product
 from statistics import median
 from typing import Any
 
@@ -21,7 +22,12 @@ def scores_table(chapter: Chapter, results: Results) -> Markup:
     if not names:
         return Markup("")
     about = {name: _about(chapter, name.removeprefix(SCORE)) for name in names}
-    rows = [_row(results, name, skill, about[name].get("unit", "")) for name in names for skill in results.skills]
+    rows = list[tuple[object, ...]]()
+    for name, skill in product(names, results.skills):
+        given = [row.values.get(name, math.nan) for row in results.of(skill)]
+        values = [value for value in given if math.isfinite(value)]
+        figures = [number(f(values)) for f in (median, min, max)] if values else ["none"] * 3
+        rows.append((words(name.removeprefix(SCORE)), skill, len(values), *figures, about[name].get("unit", "")))
     said = [f"{words(name.removeprefix(SCORE))}: {text}" for name in names if (text := about[name].get("summary", ""))]
     caption = "Of all trials that have the figure, failed ones too. " + " ".join(
         f"{text.rstrip('.')}." for text in said
@@ -33,13 +39,6 @@ def _about(chapter: Chapter, name: str) -> Mapping[str, str]:
     told = chapter.summary.get("scores")
     found = told.get(name) if isinstance(told, dict) else None
     return {k: v for k, v in found.items() if isinstance(v, str)} if isinstance(found, dict) else {}
-
-
-def _row(results: Results, name: str, skill: str, unit: str) -> tuple[object, ...]:
-    given = [row.values.get(name, math.nan) for row in results.of(skill)]
-    values = [value for value in given if math.isfinite(value)]
-    figures = [number(f(values)) for f in (median, min, max)] if values else ["none"] * 3
-    return (words(name.removeprefix(SCORE)), skill, len(values), *figures, unit)
 
 
 def said_of(meta: Mapping[str, Any]) -> list[str]:

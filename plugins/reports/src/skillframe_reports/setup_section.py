@@ -65,7 +65,13 @@ def taught_by(chapter: Chapter, skill: str) -> tuple[str, bool]:
         return "not known: the folder does not hold the skill", False
     if not metas:
         return "nobody: the skill file names no demonstration", False
-    counts = Counter(_teacher(meta) for meta in metas)
+    counts = Counter[str]()
+    for meta in metas:
+        how = f" ({kind})" if meta is not None and (kind := meta.get("teacher")) else ""
+        if meta is None:
+            counts["whose teacher is not known (the folder does not hold the recording)"] += 1
+        else:
+            counts[f"by a simulated teacher{how}" if meta.get("simulated") else f"from a recording{how}"] += 1
     said = [f"{_count(n)} {who}" for who, n in counts.items()]
     return " and ".join(said), any(meta is not None and bool(meta.get("simulated")) for meta in metas)
 
@@ -91,13 +97,6 @@ def _teachers(chapter: Chapter, skill: str) -> list[Mapping[str, Any] | None] | 
 
 def _count(n: int) -> str:
     return "one demonstration" if n == 1 else f"{n} demonstrations"
-
-
-def _teacher(meta: Mapping[str, Any] | None) -> str:
-    if meta is None:
-        return "whose teacher is not known (the folder does not hold the recording)"
-    how = f" ({kind})" if (kind := meta.get("teacher")) else ""
-    return f"by a simulated teacher{how}" if meta.get("simulated") else f"from a recording{how}"
 
 
 def robot_words(chapter: Chapter) -> str:

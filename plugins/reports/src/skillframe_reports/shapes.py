@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from skillframe.frames import Float, cross, matrix_from_quaternion, unit
 
 SEGMENTS = 32
-PLANE_HALF_SIZE = 1.0
 
 
 class Mesh(NamedTuple):
@@ -103,10 +102,6 @@ def _capsule(size: Sequence[float]) -> Mesh:
     return revolve([*low, *[(x, -z, n, -m) for x, z, n, m in reversed(low)]])
 
 
-def _sphere(size: Sequence[float]) -> Mesh:
-    return _capsule([size[0], 0.0])
-
-
 def _box(size: Sequence[float]) -> Mesh:
     half = np.array(size[:3])
     vertices: list[Float] = []
@@ -125,12 +120,18 @@ def _box(size: Sequence[float]) -> Mesh:
 
 
 def _plane(size: Sequence[float]) -> Mesh:
-    x, y = (s if 0.0 < s < PLANE_HALF_SIZE else PLANE_HALF_SIZE for s in (*size[:2], 0.0, 0.0)[:2])
+    x, y = (s if 0.0 < s < 1.0 else 1.0 for s in (*size[:2], 0.0, 0.0)[:2])  # infinite ones are drawn 1 m to each side
     vertices = np.array([(-x, -y, 0.0), (x, -y, 0.0), (x, y, 0.0), (-x, y, 0.0)])
     return Mesh(vertices, np.tile([0.0, 0.0, 1.0], (4, 1)), np.array([(0, 1, 2), (0, 2, 3)]), np.zeros((0, 4)))
 
 
-_MAKERS = {"box": _box, "sphere": _sphere, "capsule": _capsule, "cylinder": _cylinder, "plane": _plane}
+_MAKERS = {
+    "box": _box,
+    "sphere": lambda size: _capsule([size[0], 0.0]),
+    "capsule": _capsule,
+    "cylinder": _cylinder,
+    "plane": _plane,
+}
 
 
 def face_normals(vertices: Float, faces: NDArray[np.int64]) -> Float:

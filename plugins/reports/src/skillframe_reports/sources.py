@@ -290,15 +290,15 @@ def _read_folder_traces(chapter: Chapter, folder: Path) -> None:
         if trace is not None:
             found.append((path, trace))
     chapter.traces = len(found)
-    order = list(chapter.results.skills) if chapter.results else []
-    for path, trace in sorted(telling(found, chapter.results), key=lambda pair: _rank(pair[1], order)):
+    order = {skill: i for i, skill in enumerate(chapter.results.skills if chapter.results else ())}
+
+    def rank(pair: tuple[Path, Trace]) -> tuple[int, bool]:
+        meta = pair[1].meta
+        return order.get(str(meta.get("skill", "")), len(order)), not meta.get("success")
+
+    for path, trace in sorted(telling(found, chapter.results), key=rank):
         chapter.runs.append(Run(path.name, trace, why_typical(trace, chapter.results)))
         _remember(chapter, path, f"traces/{path.name}")
-
-
-def _rank(trace: Trace, order: list[str]) -> tuple[int, bool]:
-    skill = str(trace.meta.get("skill", ""))
-    return (order.index(skill) if skill in order else len(order)), not trace.meta.get("success")
 
 
 def _read_demonstrations(chapter: Chapter, folder: Path) -> None:

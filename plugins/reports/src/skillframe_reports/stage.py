@@ -18,7 +18,7 @@ from skillframe_reports.shapes import Mesh, merge, mesh_of, section
 
 FIXTURE = "fixture"
 """Name of the fixture's body in a trace."""
-AZIMUTH, ELEVATION, FIELD_OF_VIEW = np.radians(-62.0), np.radians(24.0), np.radians(32.0)
+FIELD_OF_VIEW = np.radians(32.0)
 CLOSE = 0.13
 """Distance from the tip [m] of things in the close view."""
 
@@ -28,8 +28,8 @@ class Camera(NamedTuple):
 
     target: Float
     distance: float
-    azimuth: float = float(AZIMUTH)
-    elevation: float = float(ELEVATION)
+    azimuth: float = float(np.radians(-62.0))
+    elevation: float = float(np.radians(24.0))
     field_of_view: float = float(FIELD_OF_VIEW)
 
     @property

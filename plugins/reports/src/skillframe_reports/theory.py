@@ -84,17 +84,15 @@ def mark(axes: Axes, name: ShownQuantity, region: Region) -> Markup:
         ends = (sign * region.limit * name.factor for sign in (-1.0, 1.0))
         return join(axes.vertical(end, "theory") for end in ends if axes.inside(end, vertical=False))
     limits = name.factor * np.maximum(np.concatenate([limits for _, limits in region.over.values()]), 0.0)
-    return join(_band(axes, sign * float(limits.min()), sign * float(limits.max())) for sign in (-1.0, 1.0))
-
-
-def _band(axes: Axes, first: float, second: float) -> Markup:
-    low, high = max(min(first, second), axes.x[0]), min(max(first, second), axes.x[1])
-    if low >= high:
-        return Markup("")
-    left, right = round(float(axes.across(low)), 1), round(float(axes.across(high)), 1)
-    return tag(
-        "rect", x=left, y=axes.top, width=round(right - left, 1), height=axes.bottom - axes.top, class_="theory-band"
-    )
+    bands = []
+    for sign in (-1.0, 1.0):
+        first, second = sign * float(limits.min()), sign * float(limits.max())
+        low, high = max(min(first, second), axes.x[0]), min(max(first, second), axes.x[1])
+        if low < high:
+            left, right = round(float(axes.across(low)), 1), round(float(axes.across(high)), 1)
+            place = {"x": left, "y": axes.top, "width": round(right - left, 1), "height": axes.bottom - axes.top}
+            bands.append(tag("rect", **place, class_="theory-band"))
+    return join(bands)
 
 
 def theory_sentence(found: Sequence[Region], varied: Sequence[str]) -> Markup:

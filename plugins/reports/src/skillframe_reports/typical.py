@@ -16,7 +16,6 @@ from skillframe.execution import Trace
 from skillframe_reports.markup import number
 from skillframe_reports.results import ResultRow, Results
 
-MOST_RUNS = 4
 Found = tuple[Path, Trace]
 
 
@@ -38,10 +37,10 @@ def telling(found: Sequence[Found], results: Results | None) -> list[Found]:
     groups: dict[tuple[str, bool], list[Found]] = {}
     for path, trace in found:
         groups.setdefault((str(trace.meta.get("skill", "")), bool(trace.meta.get("success"))), []).append((path, trace))
-    chosen = [_chosen(group, success, results) for (_, success), group in groups.items()][:MOST_RUNS]
+    chosen = [_chosen(group, success, results) for (_, success), group in groups.items()][:4]
     names = {path for path, _ in chosen}
     rest = [pair for pair in found if pair[0] not in names]
-    return chosen if len(chosen) > 1 else [*chosen, *rest][: min(2, MOST_RUNS)]
+    return chosen if len(chosen) > 1 else [*chosen, *rest][:2]
 
 
 def _chosen(group: Sequence[Found], success: bool, results: Results | None) -> Found:

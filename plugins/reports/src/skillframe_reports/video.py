@@ -26,7 +26,7 @@ FRAME_RATE = 25
 FAR_WIDTH, CLOSE_WIDTH, HEIGHT, STRIP = 400, 560, 480, 80
 QUALITY = "20"  # libx264's constant rate factor: nearly lossless to the eye
 SUFFIXES = (".mp4", ".m4v", ".mov")
-INK, FAINT, FORCE = (38, 46, 56), (176, 184, 194), (204, 60, 46)
+FAINT = (176, 184, 194)
 LEFT = 16  # of the force curve [pixels]
 OWN = "skillframe's own renderer, because OpenGL draws nothing here (skillframe doctor)"
 STOPPED = "skillframe's own renderer, because "
@@ -156,11 +156,11 @@ class _Strip:
         pen, font = ImageDraw.Draw(drawn), ImageFont.load_default(15)
         pen.line([(LEFT, STRIP - 10), (FAR_WIDTH + CLOSE_WIDTH - LEFT, STRIP - 10)], fill=FAINT)
         pen.line(self._curve, fill=FAINT, width=1)
-        pen.line(self._curve[: sample + 1], fill=FORCE, width=2)
+        pen.line(self._curve[: sample + 1], fill=(204, 60, 46), width=2)
         meta = self._meta
         where = " in ".join(str(meta[key]) for key in ("robot", "world") if meta.get(key))
         now = f"{self._time[sample]:5.2f} s    contact force {self._force[sample]:4.1f} N"
         if sample == len(self._time) - 1:
             now += "    goal reached" if meta.get("success") else f"    {meta.get('failure') or 'goal not reached'}"
-        pen.text((LEFT, 6), f"{meta.get('skill') or ''}    {where}    {now}".strip(), fill=INK, font=font)
+        pen.text((LEFT, 6), f"{meta.get('skill') or ''}    {where}    {now}".strip(), fill=(38, 46, 56), font=font)
         return np.asarray(drawn)

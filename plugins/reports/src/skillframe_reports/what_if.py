@@ -23,9 +23,6 @@ from skillframe_reports.results import ResultRow, Results
 from skillframe_reports.svg import Axes, Point, padded, picture
 from skillframe_reports.theory import Region
 
-MOST = 12
-GROUPS = 4
-
 
 class Measure(NamedTuple):
     """A column with its words, display unit and factor.
@@ -75,13 +72,20 @@ class Effect(NamedTuple):
 
 def what_if(results: Results, limits: Sequence[Region]) -> Markup:
     """Return the section: curves and a sentence for each quantity, most influential first."""
-    names = influence(results)[:MOST]
+    ranked = influence(results)
+    names = ranked[:12]
     if not names:
         return Markup("")
     found = {name: [*_effects(results, quantity(name))] for name in names}
     tested = [effect for effects in found.values() for effect in effects if effect.p_value is not None]
     corrected = dict(zip(map(id, tested), holm([e.p_value or 0.0 for e in tested]), strict=True))
-    parts: list[object] = [tag("h3", "What if"), tag("p", _how_to_read(results, len(tested)), class_="lead")]
+    said = "Each quantity by itself, while the others vary, too. Points are medians, bars hold 80 % of "
+    said += "the trials; of success they are rates with their intervals."
+    if tested:
+        how = f", Holm over {len(tested)} tests" if len(tested) > 1 else ""
+        said += f" A change is reported where p is below 0.05 (Kruskal and Wallis{how})"
+        said += ": p says how sure it is, and not how large."
+    parts: list[object] = [tag("h3", "What if"), tag("p", said, class_="lead")]
     for name in names:
         curves = [rate_curves(results, name, limits), *(_curves(results, quantity(name), each) for each in MEASURES)]
         words = [_told(effect, corrected.get(id(effect)), len(results.skills) > 1) for effect in found[name]]
@@ -91,19 +95,9 @@ def what_if(results: Results, limits: Sequence[Region]) -> Markup:
             tag("p", *(f"{each} " for each in words if each)),
             tag("div", *curves, class_="grid three"),
         ]
-    if left_out := influence(results)[MOST:]:
+    if left_out := ranked[12:]:
         parts.append(note(f"Less telling and not drawn: {', '.join(quantity(name).label for name in left_out)}."))
     return join(parts)
-
-
-def _how_to_read(results: Results, tests: int) -> str:
-    drawn = "Each quantity by itself, while the others vary, too. Points are medians, bars hold 80 % of "
-    drawn += "the trials; of success they are rates with their intervals."
-    if not tests:
-        return drawn
-    how = f", Holm over {tests} tests" if tests > 1 else ""
-    told = f"{drawn} A change is reported where p is below 0.05 (Kruskal and Wallis{how})"
-    return f"{told}: p says how sure it is, and not how large."
 
 
 def _groups(values: Float) -> list[tuple[Float, tuple[float, float]]]:
@@ -111,8 +105,8 @@ def _groups(values: Float) -> list[tuple[Float, tuple[float, float]]]:
     known = np.unique(values[np.isfinite(values)])
     if len(known) <= 8:
         return [(values == value, (float(value), float(value))) for value in known]
-    edges = np.quantile(values[np.isfinite(values)], np.linspace(0.0, 1.0, GROUPS + 1))
-    which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, GROUPS - 1)
+    edges = np.quantile(values[np.isfinite(values)], np.linspace(0.0, 1.0, 5))  # of four groups
+    which = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
     which = np.where(np.isfinite(values), which, -1)
     return [(which == k, (float(low), float(high))) for k, (low, high) in enumerate(pairwise(edges))]
 
@@ -150,16 +144,13 @@ def _effect(
     elif len(values) < 40:
         poor = f"{len(values)} trials are too few to decide"
     known = [each for i, _ in groups if len(each := values[i][np.isfinite(values[i])])]
-    p_value = None if poor else _kruskal(known)
+    p_value = None
+    if not poor:
+        from scipy import stats  # not needed for a page without a table
+
+        alike = len(known) < 2 or np.ptp(np.concatenate(known)) == 0.0
+        p_value = 1.0 if alike else float(stats.kruskal(*known).pvalue)
     return Effect(skill, what, p_value, poor, f"{low[1]} {low[2]}", f"{high[1]} {high[2]}")
-
-
-def _kruskal(parts: Sequence[Float]) -> float:
-    """p-value of equal distributions, 1 if all values are equal."""
-    from scipy import stats  # not needed for a page without a table
-
-    whole = np.concatenate(parts)
-    return 1.0 if len(parts) < 2 or np.ptp(whole) == 0.0 else float(stats.kruskal(*parts).pvalue)
 
 
 def _span(span: tuple[float, float], name: ShownQuantity) -> str:

@@ -47,15 +47,12 @@ def run(source: Path, out: Path | None, workers: int | None, **settings: Any) ->
       skillframe certify run certified
       skillframe certify run valley.task.toml --out valley --workers 2
     """
-    from skillframe.files.documents import kind_of
-
-    return (_task if kind_of(source) == "task" else _campaign)(source, out, workers, **settings)
-
-
-def _task(source: Path, out: Path | None, workers: int | None, **settings: Any) -> int:
     from skillframe.errors import InputError
+    from skillframe.files.documents import kind_of
     from skillframe_certify.commands.task import certify_task
 
+    if kind_of(source) != "task":
+        return _campaign(source, out, workers, **settings)
     said = next((name for name, value in settings.items() if value), None)
     if said is not None:
         said = f"--{said.removeprefix('as_')}"
@@ -69,10 +66,16 @@ def _campaign(
     source: Path, out: Path | None, workers: int | None, *, rate: float | None, confidence: float | None,
     skill: str | None, look: int | None, again: bool, as_json: bool,
 ) -> int:  # fmt: skip
+    from skillframe.errors import InputError
     from skillframe_certify.certificate import CERTIFICATE, write_certificate
+    from skillframe_certify.real_trials import is_real
 
     folder = source if out is None else out
-    _refuse_real(source)
+    if is_real(source):
+        raise InputError(
+            source, "holds real trials, and a claim has to be written before the trials that test it",
+            f"see their interval, valid at every look: skillframe report {source} --out page.html",
+        )  # fmt: skip
     with terminable() as code:
         try:
             if out is not None:
@@ -92,18 +95,6 @@ def _campaign(
         _show(found, content["predicate"])
         click.echo(f"certificate  {folder / CERTIFICATE}; to check it: skillframe certify check {folder}")
     return 0 if content["predicate"]["certified"] else 1
-
-
-def _refuse_real(source: Path) -> None:
-    """Refuse real trials: they exist before the claim, so they cannot support one."""
-    from skillframe.errors import InputError
-    from skillframe_certify.real_trials import is_real
-
-    if is_real(source):
-        raise InputError(
-            source, "holds real trials, and a claim has to be written before the trials that test it",
-            f"see their interval, valid at every look: skillframe report {source} --out page.html",
-        )  # fmt: skip
 
 
 def start(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -51,19 +51,16 @@ def command(file: Path, alpha: float, samples: str | None, score: str | None, lo
     trials = read_trials(table_path(file) if file.is_dir() else file, drawn, score)
     found = compare(trials, alpha, 0 if score is None else -1 if lower else 1)
     if as_json:
-        emit_json(_plain(found) | {"real": trials.real, "left_out_after": dict(trials.left_out)})
+        emit_json({
+            "alpha": found.alpha, "doubts": list(found.doubts),
+            "policies": [each._asdict() for each in found.standings],
+            "comparisons": [{name: getattr(pair, name) for name in pair.__slots__} for pair in found.pairs],
+            "real": trials.real, "left_out_after": dict(trials.left_out),
+        })  # fmt: skip
         return
     if trials.real:
         click.echo("real trials")
     _tell(found, score, trials.left_out)
-
-
-def _plain(found: Judgement) -> dict[str, Any]:
-    return {
-        "alpha": found.alpha, "doubts": list(found.doubts),
-        "policies": [each._asdict() for each in found.standings],
-        "comparisons": [{name: getattr(pair, name) for name in pair.__slots__} for pair in found.pairs],
-    }  # fmt: skip
 
 
 def _tell(found: Judgement, score: str | None, left: Mapping[str, int]) -> None:

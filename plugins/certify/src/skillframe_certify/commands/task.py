@@ -43,14 +43,22 @@ def certify_task(task: Path, out: Path, workers: int | None) -> int:
     """Run all steps from a task file to a certificate and a report, and return the exit code.
 
     Raises:
-        InputError: the task is unusable, or the folder belongs to something else.
+        InputError: the task is unusable, the folder belongs to something else, or its skill is not that of the proof.
     """
+    from skillframe.campaign import file_hash
     from skillframe.cli.main import run
+    from skillframe.errors import InputError
+    from skillframe_certify.certificate import examine
+    from skillframe_certify.question import LOOK
     from skillframe_certify.task import TaskFile
 
     given = TaskFile.from_toml(task)
     given.settle(out)
-    _refuse_other_skill(out)
+    skill, proved = out / SKILL, out / "proof" / LOOK / "skills" / SKILL
+    if skill.is_file() and proved.is_file() and file_hash(skill) != file_hash(proved):
+        raise InputError(
+            skill, f"is not the skill that {out / 'proof'} is about", "put it back, or certify it with another --out"
+        )
     steps = steps_of(given, out, workers)
     for number, step in enumerate(steps, start=1):
         said = f"[{number} of {len(steps)}] $ skillframe {shlex.join(step.command)}"
@@ -62,25 +70,14 @@ def certify_task(task: Path, out: Path, workers: int | None) -> int:
         code = run([*step.command, "--quiet"] if is_quiet() else step.command)
         if code and not (step.may_say_no and code == NOT_CERTIFIED):
             return code
-    return _conclude(out)
-
-
-def _refuse_other_skill(out: Path) -> None:
-    """Refuse a skill that differs from the one in the proof.
-
-    Raises:
-        InputError: the skill is not the one that the trials ran.
-    """
-    from skillframe.campaign import file_hash
-    from skillframe.errors import InputError
-    from skillframe_certify.question import LOOK
-
-    skill = out / SKILL
-    proved = out / "proof" / LOOK / "skills" / SKILL
-    if skill.is_file() and proved.is_file() and file_hash(skill) != file_hash(proved):
-        raise InputError(
-            skill, f"is not the skill that {out / 'proof'} is about", "put it back, or certify it with another --out"
-        )
+    content, wrong = examine(out / "proof")
+    if wrong or content is None:
+        click.echo(f"\nNot certified: the certificate does not follow from its trials: {'; '.join(wrong)}", err=True)
+        return NOT_CERTIFIED
+    word = "Certified" if content["certified"] else "Not certified"
+    click.echo(f"\n{word}. Open {out / 'report.html'} in a browser, its first page is the certificate;")
+    click.echo(f"to check it: skillframe certify check {out / 'proof'}")
+    return 0 if content["certified"] else NOT_CERTIFIED
 
 
 def steps_of(task: TaskFile, out: Path, workers: int | None) -> list[Step]:
@@ -113,16 +110,3 @@ def steps_of(task: TaskFile, out: Path, workers: int | None) -> list[Step]:
         Step(["certify", "run", str(proof), *numbers, *crew], there("certificate.json"), may_say_no=True),
         Step(["report", str(proof), "--out", str(out / "report.html")], (out / "report.html").is_file),
     ]
-
-
-def _conclude(out: Path) -> int:
-    from skillframe_certify.certificate import examine
-
-    said, wrong = examine(out / "proof")
-    if wrong or said is None:
-        click.echo(f"\nNot certified: the certificate does not follow from its trials: {'; '.join(wrong)}", err=True)
-        return NOT_CERTIFIED
-    word = "Certified" if said["certified"] else "Not certified"
-    click.echo(f"\n{word}. Open {out / 'report.html'} in a browser, its first page is the certificate;")
-    click.echo(f"to check it: skillframe certify check {out / 'proof'}")
-    return 0 if said["certified"] else NOT_CERTIFIED

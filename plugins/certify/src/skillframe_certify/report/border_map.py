@@ -20,7 +20,6 @@ from skillframe_certify.report.answers import Asked
 from skillframe_certify.rounds import BORDER
 from skillframe_certify.searches import BREAK
 
-CELLS = 60
 SHADES = ("fails", "unsure", "holds")
 
 
@@ -45,13 +44,14 @@ def border_map(asked: Asked, theory: Sequence[Region] = ()) -> Markup:
     nominal = asked.found.get(BREAK, {}).get("nominal", {})
     whole = {name: 0.5 * (low + high) for name, (low, high) in asked.question.ranges.items()}
     cut: Float = asked.question.scaled({**whole, **nominal, **middle})[0]
-    centres = (np.arange(CELLS) + 0.5) * 2.0 / CELLS - 1.0
-    points = np.tile(cut, (CELLS * CELLS, 1))
-    points[:, up], points[:, across] = np.repeat(centres, CELLS), np.tile(centres, CELLS)
+    cells = 60  # along each side
+    centres = (np.arange(cells) + 0.5) * 2.0 / cells - 1.0
+    points = np.tile(cut, (cells * cells, 1))
+    points[:, up], points[:, across] = np.repeat(centres, cells), np.tile(centres, cells)
     mean, spread = surrogate.mean(points), surrogate.deviation(points)
     unsure = 0.674489750196082 * spread  # the predicted success is between 25 and 75 %
-    kinds = np.where(np.abs(mean) < unsure, 1, np.where(mean > 0.0, 2, 0)).reshape(CELLS, CELLS)
-    width, height = (axes.right - axes.across(axes.x[0])) / CELLS, (axes.bottom - axes.top) / CELLS
+    kinds = np.where(np.abs(mean) < unsure, 1, np.where(mean > 0.0, 2, 0)).reshape(cells, cells)
+    width, height = (axes.right - axes.across(axes.x[0])) / cells, (axes.bottom - axes.top) / cells
     shapes = ["", "", ""]
     for row, line in enumerate(kinds):
         column = 0

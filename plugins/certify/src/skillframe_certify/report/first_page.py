@@ -28,8 +28,6 @@ from skillframe_certify.rounds import BORDER
 from skillframe_certify.searches import BREAK, MATTER
 
 ELSE = "not simulated: real sensors, hands, wear, temperature, people"
-NAMED, BESIDE = 6, 5
-"""Most failed trials that are named, and paragraphs beside the map."""
 
 
 class Stand(NamedTuple):
@@ -83,7 +81,7 @@ def certificate_page(chapter: Chapter) -> Markup:
     )
     beside, below = (
         tag("dl", *(join([tag("dt", label), tag("dd", text)]) for label, text in part if text))
-        for part in (told[:BESIDE], told[BESIDE:])
+        for part in (told[:5], told[5:])
     )
     drawn = border_map(asked, regions(chapter.scene, asked.names))
     signed = (
@@ -98,11 +96,6 @@ def certificate_page(chapter: Chapter) -> Markup:
     )  # fmt: skip
 
 
-def _span(name: str, low: float, high: float) -> str:
-    q = quantity(name)
-    return f"{q.label} {number(q.factor * low)} to {number(q.factor * high)} {q.unit}".strip()
-
-
 def _claim(chapter: Chapter, asked: Asked) -> str:
     told, box = asked.predicate or {}, box_of(asked)
     rate = percent(float(told.get("rate", asked.question.rate)))
@@ -111,7 +104,10 @@ def _claim(chapter: Chapter, asked: Asked) -> str:
     robot, world = (name_of(str(told.get(key) or chapter.spec.get(key, ""))) for key in ("robot", "world"))
     where = f"{skill}, {robot} in {world}"
     sure = percent(float(told.get("confidence", asked.question.confidence)))
-    spans = "; ".join(_span(name, *ends) for name, ends in box.items())
+    shown = [(quantity(name), *ends) for name, ends in box.items()]
+    spans = "; ".join(
+        f"{q.label} {number(q.factor * low)} to {number(q.factor * high)} {q.unit}".strip() for q, low, high in shown
+    )
     if not box:
         return f"{where}: no box is claimed. Required: at least {rate} with {sure} confidence."
     said = "succeeds" if told.get("certified") else "was claimed to succeed"
@@ -125,7 +121,7 @@ def _evidence(chapter: Chapter, asked: Asked) -> str:
     parts = [f"failures among fresh trials, smallest box first: {', '.join(counts)}"] if counts else []
     failed = told.get("failed_trials", [])
     if failed:
-        some = ", ".join(map(str, failed[:NAMED])) + (" ..." if len(failed) > NAMED else "")
+        some = ", ".join(map(str, failed[:6])) + (" ..." if len(failed) > 6 else "")
         parts.append(
             f"failed trials: {some} (to replay one: skillframe campaign replay {asked.folder}/{asked.evidence} TRIAL)"
         )

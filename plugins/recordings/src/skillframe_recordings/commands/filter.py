@@ -57,7 +57,7 @@ def command(
     """
     from skillframe.demonstration import faults, stalls
     from skillframe.extend import read_demonstration, write_demonstration
-    from skillframe_recordings.conditioning.offline import filter_wrench, remove_bias, smooth
+    from skillframe_recordings.conditioning.offline import doubtful_bias, filter_wrench, remove_bias, smooth
 
     demonstration = read_demonstration(file, layout)
     held = stalls(demonstration)
@@ -68,8 +68,13 @@ def command(
     removed = None
     if bias or weight:
         removed = remove_bias(demonstration, _pair("--free-air", free_air), weight)
-        if free_air is None:
-            _doubt(demonstration, removed)
+        if free_air is None and (force := doubtful_bias(demonstration, removed)) is not None:
+            first, last = removed.stretch
+            click.echo(
+                f"warning: {force:.2f} N from {first:.2f} to {last:.2f} s were taken for bias; if the recording starts "
+                "in contact, name a stretch without (--free-air FROM,TO), or leave the bias (--no-bias)",
+                err=True,
+            )
         demonstration = removed.demonstration
     if method != "none":
         run = smooth if method == "smoother" else filter_wrench
@@ -77,22 +82,12 @@ def command(
     write_demonstration(demonstration, out)
     said = demonstration.meta.get("conditioning", {})
     if as_json:
-        emit_json({**_plain(said), "written": str(out)})
+        payload = said.get("payload", {})  # infinite condition numbers become null
+        payload = {k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in payload.items()}
+        emit_json({**said, **({"payload": payload} if payload else {}), "written": str(out)})
     else:
         _show(out, removed, said)
     return 0
-
-
-def _doubt(demonstration: Demonstration, removed: Removed) -> None:
-    from skillframe_recordings.conditioning.offline import doubtful_bias
-
-    if (force := doubtful_bias(demonstration, removed)) is not None:
-        first, last = removed.stretch
-        click.echo(
-            f"warning: {force:.2f} N from {first:.2f} to {last:.2f} s were taken for bias; if the recording starts in "
-            "contact, name a stretch without (--free-air FROM,TO), or leave the bias (--no-bias)",
-            err=True,
-        )
 
 
 def _pair(name: str, text: str | None) -> tuple[float, float] | None:
@@ -121,14 +116,6 @@ def _model(demonstration: Demonstration, noise: tuple[float, float] | None, corn
     return WrenchModel.from_corner(model.noise if noise is None else np.repeat(noise, 3), corners, dt)
 
 
-def _plain(said: dict[str, Any]) -> dict[str, Any]:
-    """Replace infinite condition numbers by None for JSON."""
-    payload = {
-        k: v if not isinstance(v, float) or math.isfinite(v) else None for k, v in said.get("payload", {}).items()
-    }
-    return {**said, **({"payload": payload} if payload else {})}
-
-
 def _show(out: Path, removed: Removed | None, said: dict[str, Any]) -> None:
     if removed is not None:
         payload = removed.payload
@@ -146,18 +133,10 @@ def _show(out: Path, removed: Removed | None, said: dict[str, Any]) -> None:
         corner = said["corner_hz"]
         click.echo(f"noise       {six(said['noise'])}")
         click.echo(f"{said['method']:<12}corner {corner[0]:.1f} Hz (force), {corner[3]:.1f} Hz (torque)")
-        for line in _chosen(said):
-            click.echo(line)
+        for i, name, unit in ((0, "force", "N"), (1, "torque", "Nm")) if "because" in said else ():
+            passes = [v for v in said["passes"][3 * i : 3 * i + 3] if v is not None]
+            open_at = f"its own for changes above {max(passes):.2g} {unit}" if passes else "never its own"
+            share = f" ({100.0 * said['opened'][i]:.0f} % of the samples)" if passes else ""
+            quiet = f"{said['quiet_corner_hz'][3 * i]:.1f} Hz where nothing happens"
+            click.echo(f"{name:<12}{quiet}, {open_at}{share}: {said['because'][i]}")
     click.echo(f"written     {out}")
-
-
-def _chosen(said: dict[str, Any]) -> list[str]:
-    if "because" not in said:
-        return []
-    quiet, opened, lines = said["quiet_corner_hz"], said["opened"], []
-    for i, name, unit in ((0, "force", "N"), (1, "torque", "Nm")):
-        passes = [v for v in said["passes"][3 * i : 3 * i + 3] if v is not None]
-        open_at = f"its own for changes above {max(passes):.2g} {unit}" if passes else "never its own"
-        share = f" ({100.0 * opened[i]:.0f} % of the samples)" if passes else ""
-        lines.append(f"{name:<12}{quiet[3 * i]:.1f} Hz where nothing happens, {open_at}{share}: {said['because'][i]}")
-    return lines

@@ -6,20 +6,18 @@ import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from skillframe.cli import emit_json
-
-if TYPE_CHECKING:
-    from skillframe_recordings.proposal.propose import Proposal
 
 
 def proposed(
     files: Sequence[Path], settings: dict[str, Any], layout: Path | None, as_json: bool, command: str, *after: str
 ) -> int:
     """Print the command that reads each file, and return 1 unless every command is complete."""
+    from skillframe_recordings.proposal.layouts import OF_ONE, merged, typed, write_layout
     from skillframe_recordings.proposal.reading import propose_reading
 
     found = [replace(propose_reading(path, **settings), command=(command,), after=after) for path in files]
@@ -34,26 +32,20 @@ def proposed(
         if proposal.error:
             click.echo(f"  refused   {proposal.error}")
     if layout is not None and whole:
-        _write(found, layout, as_json)
+        own = {p.file: {k: v for k, v in p.reading.items() if k not in OF_ONE} for p in found}
+        undecided = dict.fromkeys(text for p in found for text in p.undecided)
+        told = [proposal.file for proposal in found]
+        why = f"made by: skillframe check {shlex.join(told)} --layout auto --write-layout {layout}"
+        write_layout(layout, merged(own), undecided, why)
+        each = [w for k, v in found[0].reading.items() if k in OF_ONE for w in typed(k, v)]
+        words = ["skillframe", *found[0].command, *told, "--layout", str(layout), *each, *found[0].after]
+        click.echo(f"{layout}: written\n  type      {shlex.join(words)}", err=as_json)
+        if found[0].command == ("check",):
+            out = "demos/" if len(told) > 1 else "demo.npz"
+            words = ["skillframe", "convert", *told, "--layout", str(layout), *each, "--out", out]
+            click.echo(f"  or        {shlex.join(words)}", err=as_json)
     elif layout is not None:
         click.echo(f"{layout}: not written, since a line above cannot be typed as it stands", err=True)
     elif whole and not as_json:
         click.echo("--write-layout layout.toml stores this, and --layout layout.toml reads many files with it")
     return 0 if whole else 1
-
-
-def _write(found: Sequence[Proposal], layout: Path, quiet: bool) -> None:
-    from skillframe_recordings.proposal.layouts import OF_ONE, merged, typed, write_layout
-
-    own = {p.file: {k: v for k, v in p.reading.items() if k not in OF_ONE} for p in found}
-    undecided = dict.fromkeys(text for p in found for text in p.undecided)
-    files = [proposal.file for proposal in found]
-    why = f"made by: skillframe check {shlex.join(files)} --layout auto --write-layout {layout}"
-    write_layout(layout, merged(own), undecided, why)
-    each = [w for k, v in found[0].reading.items() if k in OF_ONE for w in typed(k, v)]
-    words = ["skillframe", *found[0].command, *files, "--layout", str(layout), *each, *found[0].after]
-    click.echo(f"{layout}: written\n  type      {shlex.join(words)}", err=quiet)
-    if found[0].command == ("check",):
-        out = "demos/" if len(files) > 1 else "demo.npz"
-        words = ["skillframe", "convert", *files, "--layout", str(layout), *each, "--out", out]
-        click.echo(f"  or        {shlex.join(words)}", err=quiet)

@@ -191,19 +191,26 @@ def check(
 
 def _show(found: DemonstrationAudit) -> None:
     degrees = math.degrees(found.turned_rad)
+    words = [say(found.wrench[key]) for key, say in WRENCH_WORDS.items() if key in found.wrench]
+    words += [f"{key} {value}" for key, value in found.wrench.items() if key not in WRENCH_WORDS]
+    frames = f"; points {', '.join(found.frames)}" if found.frames else ""
+    late = dict.fromkeys(found.onsets_unseen, ", onset not seen")
+    contacts = [f"{c[0]:.2f}-{c[1]:.2f} s (peak {c[2]:.1f} N{late.get(c[0], '')})" for c in found.contacts]
+    stalls = [f"{s['what']} {s['start']:.2f}-{s['stop']:.2f} s" for s in found.stalls]
+    faults = [f"{f['kind']} of {f['what']} {f['start']:.2f}-{f['stop']:.2f} s" for f in found.faults]
     click.echo(found.file)
     lines = [
         ("samples", f"{found.samples}, {found.duration_s:.3f} s at {found.rate_hz:.5g} Hz, jitter {found.jitter:.1%}"),
         ("gaps", ", ".join(f"{g[1]:.3g} s at {g[0]:.3f} s" for g in found.gaps[:5]) or "none"),
         ("motion", f"{found.path_m * 1e3:.1f} mm, {degrees:.1f} degrees"),
-        ("wrench", _declared(found)),
+        ("wrench", (", ".join(words) or "not declared, taken as environment on tool, base axes") + frames),
         ("bias", six(found.bias)),
         ("noise", f"{six(found.noise)} at rest; {six(found.noise_typical)} typically"),
         ("drift", six(found.drift) if found.drift else "not seen (it does not end in free air)"),
         ("peak", f"{found.peak_force_n:.2f} N, {counted(found.spikes, 'spike')}"),
-        ("contact", _contacts(found)),
-        *([("stalls", _stalls(found))] if found.stalls else []),
-        *([("faults", _faults(found))] if found.faults else []),
+        ("contact", f"above {found.contact_threshold_n:.2f} N: " + (_first(contacts) or "none")),
+        *([("stalls", ", ".join(stalls))] if stalls else []),
+        *([("faults", _first(faults))] if faults else []),
     ]
     for name, text in lines:
         click.echo(f"  {name:<9}{text}")
@@ -221,34 +228,16 @@ WRENCH_WORDS: dict[str, Callable[[Any], str]] = {
 }  # fmt: skip
 
 
-def _declared(found: DemonstrationAudit) -> str:
-    frames = f"; points {', '.join(found.frames)}" if found.frames else ""
-    words = [say(found.wrench[key]) for key, say in WRENCH_WORDS.items() if key in found.wrench]
-    words += [f"{key} {value}" for key, value in found.wrench.items() if key not in WRENCH_WORDS]
-    return (", ".join(words) or "not declared, taken as environment on tool, base axes") + frames
-
-
 def six(values: list[float]) -> str:
     """Format force and torque with units."""
     return f"({', '.join(f'{v:.3f}' for v in values[:3])}) N, ({', '.join(f'{v:.4f}' for v in values[3:])}) Nm"
 
 
+def _first(texts: list[str]) -> str:
+    """The first eight texts and the number of the others."""
+    return ", ".join(texts[:8]) + (f" and {len(texts) - 8} more" if len(texts) > 8 else "")
+
+
 def counted(count: int, what: str) -> str:
     """Format a count with its noun."""
     return f"{count} {what}{'s' * (count != 1)}"
-
-
-def _stalls(found: DemonstrationAudit) -> str:
-    return ", ".join(f"{s['what']} {s['start']:.2f}-{s['stop']:.2f} s" for s in found.stalls)
-
-
-def _faults(found: DemonstrationAudit) -> str:
-    more = f" and {len(found.faults) - 8} more" if len(found.faults) > 8 else ""
-    return ", ".join(f"{f['kind']} of {f['what']} {f['start']:.2f}-{f['stop']:.2f} s" for f in found.faults[:8]) + more
-
-
-def _contacts(found: DemonstrationAudit) -> str:
-    late = dict.fromkeys(found.onsets_unseen, ", onset not seen")
-    spans = [f"{c[0]:.2f}-{c[1]:.2f} s (peak {c[2]:.1f} N{late.get(c[0], '')})" for c in found.contacts[:8]]
-    more = f" and {len(found.contacts) - 8} more" if len(found.contacts) > 8 else ""
-    return f"above {found.contact_threshold_n:.2f} N: " + (", ".join(spans) or "none") + more

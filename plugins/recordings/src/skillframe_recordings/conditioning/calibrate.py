@@ -30,8 +30,6 @@ from skillframe_recordings.conditioning.payload import (
     turned,
 )
 
-LEAST_SAMPLES = 8
-LEAST_MASS = 0.01  # [kg]
 STANDARD = float(np.linalg.norm(GRAVITY))
 
 
@@ -87,8 +85,8 @@ def calibrate(wrench: Float, rotation: Float, source: str = "calibration") -> Ca
     Raises:
         InputError: too few samples, too little rotation, mirrored axes, or contact.
     """
-    if len(wrench) < LEAST_SAMPLES:
-        raise InputError(source, f"holds {len(wrench)} samples", f"give {LEAST_SAMPLES} orientations or more")
+    if len(wrench) < 8:
+        raise InputError(source, f"holds {len(wrench)} samples", "give 8 orientations or more")
     down = GRAVITY / STANDARD
     seen = rotate(np.swapaxes(rotation, -1, -2), down)
     weight_and_bias = np.concatenate([seen[:, :, None], np.broadcast_to(np.eye(3), (len(seen), 3, 3))], axis=-1)
@@ -310,7 +308,7 @@ def _refuse_absurd(found: Calibration, residual: Float, source: str) -> None:
     lever, left = float(norm(found.com)), _rms(residual)
     most = max(LEAST_RESIDUAL, RESIDUAL_SHARE * STANDARD * found.mass)
     said = [
-        (found.mass < LEAST_MASS, f"a tool of {found.mass:.3g} kg, where {LEAST_MASS:g} kg is the least"),
+        (found.mass < 0.01, f"a tool of {found.mass:.3g} kg, where 0.01 kg is the least"),
         (found.mass > LARGEST_MASS, f"a tool of {found.mass:.3g} kg, where {LARGEST_MASS:g} kg is the most"),
         (lever > LONGEST_LEVER, f"a centre of mass {lever:.3g} m away, where {LONGEST_LEVER:g} m is the most"),
         (left > most, f"readings that no tool explains: {left:.3g} N rms are left, where {most:.3g} N is the most"),

@@ -170,7 +170,9 @@ def remove_bias(
     weight = bool(said.get("includes_tool_weight")) if weight is None else weight
     payload = payload_of(d, inside)
     if weight:
-        refuse_absurd(payload, _typical_noise(d, live), d.source or "demonstration", stretch)
+        sure = live.sum() >= LEAST_SAMPLES
+        typical = noise_figures(d.time, d.wrench, live).typical[:3] if sure else np.zeros(3)  # of the force in motion
+        refuse_absurd(payload, float(np.sqrt((typical**2).mean())), d.source or "demonstration", stretch)
     else:
         payload = _without_mass(d, inside, payload)
     wrench = d.wrench - payload.wrench(d.pose.rotation)
@@ -204,13 +206,6 @@ def doubtful_bias(demonstration: Demonstration, removed: Removed) -> float | Non
     noise = float(np.sqrt((noise_figures(d.time, d.wrench, removed.live).quiet[:3] ** 2).mean()))
     steady = removed.payload.residual_force <= 2.0 * noise and removed.stretch[1] < d.time[-1]
     return None if steady else force
-
-
-def _typical_noise(demonstration: Demonstration, live: NDArray[np.bool_]) -> float:
-    """Scatter of the force in motion, rms per axis [N], or 0 for short recordings."""
-    if live.sum() < LEAST_SAMPLES:
-        return 0.0
-    return float(np.sqrt((noise_figures(demonstration.time, demonstration.wrench, live).typical[:3] ** 2).mean()))
 
 
 def payload_of(demonstration: Demonstration, inside: Any) -> Payload:

@@ -110,9 +110,9 @@ class _Solution(NamedTuple):
     condition: float
 
 
-def gravity_in_tool(rotation: Float, gravity: Float = GRAVITY) -> Float:
+def gravity_in_tool(rotation: Float) -> Float:
     """Return gravity (..., 3) in tool axes [m/s^2] for orientations (..., 3, 3)."""
-    return rotate(np.swapaxes(rotation, -1, -2), gravity)
+    return rotate(np.swapaxes(rotation, -1, -2), GRAVITY)
 
 
 def identify_payload(wrench: Float, gravity: Float) -> Payload:

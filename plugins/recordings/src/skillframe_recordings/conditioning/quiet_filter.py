@@ -119,8 +119,11 @@ def _reason(identified: float, wide: float) -> str:
 
 def _part(measured: Float, quick: Float, windows: _Windows, rate: float, identified: float, causal: bool) -> CoredPart:
     """Filter forces or torques with the first choice that is no worse than the plain filter."""
+    from scipy.ndimage import uniform_filter1d
+
     most = min(10.0, HIGHEST * rate)
-    busy = _quickest(measured, rate)
+    change = norm(np.gradient(uniform_filter1d(measured, max(1, round(0.02 * rate)) | 1, axis=0), axis=0))  # of 20 ms
+    busy = np.asarray(change >= np.quantile(change, 0.9))  # the tenth with the fastest change
     corners = [share * most for share in CORNERS]
     corners = [identified, *corners] if not causal and identified < corners[0] else corners  # a lower one first
     slow = {corner: plain(measured, corner, rate, causal) for corner in corners}
@@ -151,11 +154,3 @@ def _figures(measured: Float, filtered: Float, busy: NDArray[np.bool_], windows:
     """Remaining noise by two measures, and the loss during fast changes: rms over channels, (3,)."""
     lost = measured[busy] - filtered[busy]
     return np.sqrt([*np.mean(windows.noise(filtered) ** 2, axis=1), np.mean(lost**2)])
-
-
-def _quickest(measured: Float, rate: float) -> NDArray[np.bool_]:
-    """The tenth of the samples (T,) with the fastest change of the wrench, averaged over 20 ms."""
-    from scipy.ndimage import uniform_filter1d
-
-    change = norm(np.gradient(uniform_filter1d(measured, max(1, round(0.02 * rate)) | 1, axis=0), axis=0))
-    return np.asarray(change >= np.quantile(change, 0.9))

@@ -6,7 +6,7 @@ demonstration, else the most or longest ones; a note lists the others. Arrays (3
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +51,11 @@ def table_of(
     count = _rows(usable, {part.rpartition("=")[2].partition("[")[0].strip() for part in (spec or "").split(",")})
     columns: dict[str, NDArray[np.float64]] = {}
     for name, array in usable.items():
-        columns.update(_columns(name, array, count))
+        upright = _upright(array, count)
+        if upright is not None and upright.ndim == 1:
+            columns[name] = upright.astype(float)
+        elif upright is not None:
+            columns |= {f"{name}[{i}]": upright[:, i].astype(float) for i in range(upright.shape[1])}
     if count < 2 or not columns:
         there = ", ".join(f"{name} {array.shape}" for name, array in [*arrays.items()][:LISTED])
         raise InputError(
@@ -102,17 +106,6 @@ def _upright(array: NDArray[Any], count: int) -> NDArray[Any] | None:
         if flat.ndim == 1 or flat.shape[1] <= WIDEST
         else None
     )
-
-
-def _columns(name: str, array: NDArray[Any], count: int) -> Iterator[tuple[str, NDArray[np.float64]]]:
-    upright = _upright(array, count)
-    if upright is None:
-        return
-    if upright.ndim == 1:
-        yield name, upright.astype(float)
-        return
-    for i in range(upright.shape[1]):
-        yield f"{name}[{i}]", upright[:, i].astype(float)
 
 
 def read_as_table(path: Path, options: Mapping[str, Any], table: Table, notes: list[str]) -> Demonstration:

@@ -125,12 +125,8 @@ def json_table(path: Path, options: Mapping[str, Any], notes: list[str] | None =
     fix = "give a list of records, or lists by name"
     text = read_text(path, fix)
     lines = text.splitlines() if path.suffix.lower() == ".jsonl" else []
-    content = (
-        [parse_json(line, f"{path}: row {i}", fix) for i, line in enumerate(lines, 1) if line.strip()]
-        if lines
-        else None
-    )
-    content = parse_json(text, path, fix) if content is None else content
+    records = [parse_json(line, f"{path}: row {i}", fix) for i, line in enumerate(lines, 1) if line.strip()]
+    content = records if lines else parse_json(text, path, fix)
     if isinstance(content, list) and content and all(isinstance(record, dict) for record in content):
         rows = [dict(_numbers(record, "")) for record in content]
         names = list(dict.fromkeys(name for row in rows for name in row))

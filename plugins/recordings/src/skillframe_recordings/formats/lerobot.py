@@ -49,7 +49,12 @@ def write_lerobot(demonstrations: Sequence[Demonstration], folder: Path) -> None
     fps = _rate(demonstrations)
     own = {"observation.state": POSE, "observation.wrench": WRENCH, "action": POSE}
     about = {name: {"dtype": "float32", "shape": [len(n)], "names": [*n]} for name, n in own.items()}
-    about |= {name: _scalar("float32") for name in _further(demonstrations)}
+    names = sorted(demonstrations[0].extra)
+    for d in demonstrations:
+        if sorted(d.extra) != names:
+            text = f"has the further columns {sorted(d.extra)}, and the first demonstration {names}"
+            raise InputError(d.source or "demonstration", text, "write the same columns into all")
+    about |= {f"{FURTHER}{name}": _scalar("float32") for name in names}
     kinds = ("episode_index", "frame_index", "index", "task_index")
     features = {**about, "timestamp": _scalar("float32"), **{name: _scalar("int64") for name in kinds}}
     with _whole_folder(folder) as made:
@@ -109,15 +114,6 @@ def _scalar(kind: str) -> dict[str, Any]:
     return {"dtype": kind, "shape": [1], "names": None}
 
 
-def _further(demonstrations: Sequence[Demonstration]) -> list[str]:
-    names = sorted(demonstrations[0].extra)
-    for d in demonstrations:
-        if sorted(d.extra) != names:
-            text = f"has the further columns {sorted(d.extra)}, and the first demonstration {names}"
-            raise InputError(d.source or "demonstration", text, "write the same columns into all")
-    return [f"{FURTHER}{name}" for name in names]
-
-
 def _tasks(demonstrations: Sequence[Demonstration]) -> list[str]:
     return list(dict.fromkeys(_task(d) for d in demonstrations))
 
@@ -134,7 +130,11 @@ def _write_frames(
     import pyarrow.parquet
 
     tasks, rows, total, stats = _tasks(demonstrations), [], 0, list[dict[str, dict[str, Any]]]()
-    schema = pyarrow.schema([(name, _type(pyarrow, about)) for name, about in features.items()])
+    fields = []
+    for name, about in features.items():
+        kind = pyarrow.float32() if about["dtype"] == "float32" else pyarrow.int64()
+        fields.append((name, kind if about["shape"] == [1] else pyarrow.list_(kind, about["shape"][0])))
+    schema = pyarrow.schema(fields)
     number, written, writer = 0, 0, None
     try:
         for episode, d in enumerate(demonstrations):
@@ -147,7 +147,12 @@ def _write_frames(
                 path = folder / _DATA.format(c=number // CHUNK_FILES, f=number % CHUNK_FILES)
                 path.parent.mkdir(parents=True, exist_ok=True)
                 writer = pyarrow.parquet.ParquetWriter(path, schema)
-            columns = [_column(pyarrow, arrays[name], schema.field(name).type) for name in features]
+            columns = [
+                pyarrow.array(array, type=schema.field(name).type)
+                if array.ndim == 1
+                else pyarrow.FixedSizeListArray.from_arrays(pyarrow.array(array.ravel()), array.shape[1])
+                for name, array in ((name, arrays[name]) for name in features)
+            ]
             writer.write_table(pyarrow.Table.from_arrays(columns, schema=schema))
             written += size
             stats.append({name: _statistics(array) for name, array in arrays.items()})
@@ -177,17 +182,6 @@ def _frames(d: Demonstration, episode: int, first: int, task: int, fps: int) -> 
         "timestamp": (index / fps).astype(np.float32), "episode_index": np.full(count, episode),
         "frame_index": index, "index": first + index, "task_index": np.full(count, task),
     }  # fmt: skip
-
-
-def _type(pyarrow: Any, about: Mapping[str, Any]) -> Any:
-    plain = pyarrow.float32() if about["dtype"] == "float32" else pyarrow.int64()
-    return plain if about["shape"] == [1] else pyarrow.list_(plain, about["shape"][0])
-
-
-def _column(pyarrow: Any, array: NDArray[Any], kind: Any) -> Any:
-    if array.ndim == 1:
-        return pyarrow.array(array, type=kind)
-    return pyarrow.FixedSizeListArray.from_arrays(pyarrow.array(array.ravel()), array.shape[1])
 
 
 def _statistics(array: NDArray[Any]) -> dict[str, Any]:

@@ -58,7 +58,11 @@ def verify(path: Path) -> list[str]:
             return []
         records = list(_records(path, file))
         stored = [record for record in records if record.kind == CHUNK]
-        sizes = [_declared(file, record) for record in stored]
+        sizes = list[int]()
+        for record in stored:
+            file.seek(record.content)
+            head = file.read(_CHUNK.size)
+            sizes.append(int(_CHUNK.unpack(head)[2]) if len(head) == _CHUNK.size else 0)  # declared, when unpacked
         refuse_bomb(path, file.seek(0, 2), sum(sizes), AGAIN, most=math.inf)
         for record, size in zip(stored, sizes, strict=True):
             refuse_bomb(f"{path}: chunk at byte {record.start}", record.length, size, AGAIN, most=LARGEST_CHUNK)
@@ -149,12 +153,6 @@ def _records(path: Path, file: BinaryIO) -> Iterator[_Record]:
         if kind == FOOTER:
             return
         place += _HEAD.size + length
-
-
-def _declared(file: BinaryIO, record: _Record) -> int:
-    file.seek(record.content)
-    head = file.read(_CHUNK.size)
-    return int(_CHUNK.unpack(head)[2]) if len(head) == _CHUNK.size else 0
 
 
 def _chunk_is_protected(path: Path, file: BinaryIO, record: _Record) -> bool:

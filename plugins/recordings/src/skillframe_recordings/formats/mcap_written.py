@@ -151,18 +151,15 @@ def read_own(path: Path, text: Mapping[str, Any], options: Mapping[str, Any]) ->
     if not len(poses) == len(wrenches) == len(extra):
         raise _changed(path, "has topics of unequal length")
     with fields_of(path, ", ".join(KINDS), "messages"):
+        places = [(m.pose.position, m.pose.orientation) for m in poses]
+        rows = np.array([(p.x, p.y, p.z, q.x, q.y, q.z, q.w) for p, q in places])
         values = {
             **dict(zip(text["columns"], np.array([m.data for m in extra], dtype=float).T, strict=True)),
-            **dict(zip((*POSITION, *QUATERNION), np.array([_pose_row(m.pose) for m in poses]).T, strict=True)),
+            **dict(zip((*POSITION, *QUATERNION), rows.T, strict=True)),
             **dict(zip(WRENCH, np.array([six(m.wrench) for m in wrenches], dtype=float).T, strict=True)),
         }
     columns = Columns({name: column.copy() for name, column in values.items()}, str(path))
     return assemble_split(columns, dict(text["meta"]), chosen, [], read_wrench_file(chosen))
-
-
-def _pose_row(pose: Any) -> tuple[float, ...]:
-    p, q = pose.position, pose.orientation
-    return (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
 
 
 def _changed(path: Path, problem: str) -> InputError:

@@ -6,7 +6,7 @@ Version 2 has a file per episode, version 3 several; `--set episode=3` chooses o
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -85,17 +85,15 @@ def parquet_table(path: Path, options: Mapping[str, Any], notes: list[str] | Non
     arrays = _one_episode(path, _data_set(path, episode), episode)
     named: Arrays = {}
     for name, array in arrays.items():
-        labels = _labels(features.get(name), array)
-        named.update({f"{name}.{label}": array[:, i] for i, label in enumerate(labels)} if labels else {name: array})
+        feature = features.get(name)
+        labels = feature.get("names") if isinstance(feature, dict) else None
+        labels = next(iter(labels.values()), None) if isinstance(labels, dict) and len(labels) == 1 else labels
+        told = [str(label) for label in labels] if isinstance(labels, list) and array.ndim == 2 else []
+        if told and len(set(told)) == len(told) == array.shape[1]:
+            named |= {f"{name}.{label}": array[:, i] for i, label in enumerate(told)}
+        else:
+            named[name] = array
     return table_of(str(path), {n: a for n, a in named.items() if n not in BESIDE}, notes)
-
-
-def _labels(feature: Any, array: Any) -> list[str]:
-    names = feature.get("names") if isinstance(feature, dict) else None
-    names = next(iter(names.values()), None) if isinstance(names, dict) and len(names) == 1 else names
-    if array.ndim != 2 or not isinstance(names, list) or len(names) != array.shape[1]:
-        return []
-    return [str(name) for name in names] if len({str(name) for name in names}) == len(names) else []
 
 
 def _data_set(path: Path, episode: str | None) -> Arrays:
@@ -138,26 +136,21 @@ def _arrays(path: Path) -> Arrays:
         import pyarrow.parquet
     with foreign(path, "parquet"):
         schema = pyarrow.parquet.read_schema(path)
-        wanted = [f.name for f in schema if _is_number(pyarrow, f.type) or _is_list(pyarrow, f.type)]
+        t = pyarrow.types
+        numbers = (t.is_floating, t.is_integer, t.is_boolean, t.is_timestamp)
+        wanted = [f.name for f in schema if any(is_it(f.type) for is_it in numbers) or _is_list(pyarrow, f.type)]
         if not wanted:
             there = ", ".join(f"{f.name} ({f.type})" for f in schema)
             raise InputError(path, f"holds no numbers; its columns are {there}", "give a table of samples")
-        refuse_bomb(path, path.stat().st_size, _declared(pyarrow.parquet.read_metadata(path), wanted), LARGE)
+        metadata = pyarrow.parquet.read_metadata(path)
+        groups = (metadata.row_group(i) for i in range(metadata.num_row_groups))
+        columns = (group.column(j) for group in groups for j in range(group.num_columns))
+        wide = [c for c in columns if c.path_in_schema.split(".")[0] in wanted or c.path_in_schema in wanted]
+        declared = sum(max(NUMBER * int(c.num_values), int(c.total_uncompressed_size)) for c in wide)
+        refuse_bomb(path, path.stat().st_size, declared, LARGE)
         table = pyarrow.parquet.read_table(path, columns=wanted)
         arrays = {name: _column(pyarrow, table.column(name).combine_chunks()) for name in wanted}
     return {name: array for name, array in arrays.items() if array is not None}
-
-
-def _declared(metadata: Any, wanted: Sequence[str]) -> int:
-    groups = (metadata.row_group(i) for i in range(metadata.num_row_groups))
-    columns = (group.column(j) for group in groups for j in range(group.num_columns))
-    wide = [c for c in columns if c.path_in_schema.split(".")[0] in wanted or c.path_in_schema in wanted]
-    return sum(max(NUMBER * int(c.num_values), int(c.total_uncompressed_size)) for c in wide)
-
-
-def _is_number(pyarrow: Any, kind: Any) -> bool:
-    types = pyarrow.types
-    return bool(types.is_floating(kind) or types.is_integer(kind) or types.is_boolean(kind) or types.is_timestamp(kind))
 
 
 def _is_list(pyarrow: Any, kind: Any) -> bool:

@@ -113,7 +113,9 @@ def _pose(groups: Sequence[Group], values: Float | None) -> dict[str, int]:
     for group in usable:
         if found := _whole_pose(group, values):
             return found
-    return {**(_orientation(usable) or _kuka(groups)), **_position(usable)}
+    single = {g.words[-1]: g.columns[""] for g in groups if "" in g.letters and g.words and g.words[-1] in KUKA}
+    kuka = {KUKA[letter]: index for letter, index in single.items()} if set(single) == set(KUKA) else {}
+    return {**(_orientation(usable) or kuka), **_position(usable)}
 
 
 def _whole_pose(group: Group, values: Float | None) -> dict[str, int]:
@@ -176,11 +178,6 @@ def _orientation(groups: Sequence[Group]) -> dict[str, int]:
             if set(named) <= group.letters:
                 return {name: group.columns[axis] for axis, name in named.items()}
     return {}
-
-
-def _kuka(groups: Sequence[Group]) -> dict[str, int]:
-    single = {g.words[-1]: g.columns[""] for g in groups if "" in g.letters and g.words and g.words[-1] in KUKA}
-    return {KUKA[letter]: index for letter, index in single.items()} if set(single) == set(KUKA) else {}
 
 
 def _position(groups: Sequence[Group]) -> dict[str, int]:

@@ -109,7 +109,10 @@ def split_unit(name: str) -> tuple[str, str | None]:
 def cut(name: str) -> tuple[tuple[str, ...], str]:
     """Return a name's words and axis: a letter, number, roll, pitch, yaw, or ""."""
     name = split_unit(name)[0]
-    words = [_without_log(word) for word in re.findall(r"[a-z]+|\d+", CAMEL.sub(" ", name).lower())]
+    words = []
+    for word in re.findall(r"[a-z]+|\d+", CAMEL.sub(" ", name).lower()):
+        short = re.sub(r"(log|logs|data|traj)$", "", word)  # "plog" is "p"
+        words.append(short if short in MEANT - NOT_MEASURED else word)
     if not words:
         return (), ""
     *rest, last = words
@@ -120,15 +123,12 @@ def cut(name: str) -> tuple[tuple[str, ...], str]:
     return tuple(words), ""
 
 
-def _without_log(word: str) -> str:
-    """Remove a fused recording word: "plog" becomes "p"."""
-    short = re.sub(r"(log|logs|data|traj)$", "", word)
-    return short if short in MEANT - NOT_MEASURED else word
-
-
 def groups_of(names: Sequence[str]) -> list[Group]:
     """Return the groups of a header in the order of their first columns."""
-    cuts = [(*cut(name), _capital(name)) for name in names]
+    cuts = []
+    for name in names:
+        letters = re.findall(r"[A-Za-z]", split_unit(name)[0])
+        cuts.append((*cut(name), bool(letters) and letters[-1].isupper()))
     cases: dict[tuple[tuple[str, ...], str], set[bool]] = {}
     for words, axis, capital in cuts:
         cases.setdefault((words, axis), set()).add(capital)
@@ -137,11 +137,6 @@ def groups_of(names: Sequence[str]) -> list[Group]:
     for index, (words, axis, capital) in enumerate(cuts):
         result.setdefault((words, capital and words in both), {}).setdefault(axis, index)
     return [Group(words, columns) for (words, _), columns in result.items()]
-
-
-def _capital(name: str) -> bool:
-    letters = re.findall(r"[A-Za-z]", split_unit(name)[0])
-    return bool(letters) and letters[-1].isupper()
 
 
 def said_units(names: Sequence[str], picks: Mapping[str, int]) -> dict[str, str]:

@@ -79,16 +79,15 @@ def quaternion_readings(values: Float) -> list[OrientationReading]:
 
 def angle_readings(angles: Float) -> list[OrientationReading]:
     """Return the six orders of roll, pitch, yaw (T, 3) [rad] about moving axes. Fixed axes reverse them."""
-    return [OrientationReading("".join(order), _moving(angles, order)) for order in permutations("XYZ")]
-
-
-def _moving(angles: Float, order: Sequence[str]) -> Float:
-    result: Float = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
-    for axis in order:
-        vector = np.zeros_like(angles)
-        vector[:, "XYZ".index(axis)] = angles[:, "XYZ".index(axis)]
-        result = result @ rotation_matrix(vector)
-    return result
+    readings = []
+    for order in permutations("XYZ"):
+        turn: Float = np.broadcast_to(np.eye(3), (len(angles), 3, 3))
+        for axis in map("XYZ".index, order):
+            vector = np.zeros_like(angles)
+            vector[:, axis] = angles[:, axis]
+            turn = turn @ rotation_matrix(vector)
+        readings.append(OrientationReading("".join(order), turn))
+    return readings
 
 
 def vector_reading(vector: Float) -> OrientationReading:
@@ -106,8 +105,14 @@ def choose(readings: Sequence[OrientationReading], prior: str, witness: Witness,
         raw: (T, 4) quaternion in file order.
     """
     expected = next(r for r in readings if r.name == prior)
-    jumps = {r.name: _jump(r.rotation, witness.time) for r in readings}
-    smooth = [r for r in readings if not jumps[r.name]]
+    smooth = []
+    for r in readings:
+        quaternion = quaternion_from_matrix(r.rotation)
+        try:
+            refuse_jumps(Columns({"t": witness.time, **dict(zip(QUATERNION, quaternion.T, strict=True))}, ""))
+        except InputError:
+            continue
+        smooth.append(r)
     others = _others(smooth, expected if expected in smooth else (smooth or [expected])[0])
     if smooth and len(smooth) < len(readings) and not others:
         return Choice(smooth[0].name, smooth[0].rotation, "in every other order the tool would jump", True)
@@ -128,15 +133,6 @@ def _others(readings: Sequence[OrientationReading], one: OrientationReading) -> 
         if r is not one
         and float(norm(rotation_vector(np.swapaxes(r.rotation, -1, -2) @ one.rotation)).max()) > PROPOSAL.same_rad
     ]
-
-
-def _jump(rotation: Float, time: Float) -> bool:
-    quaternion = quaternion_from_matrix(rotation)
-    try:
-        refuse_jumps(Columns({"t": time, **dict(zip(QUATERNION, quaternion.T, strict=True))}, ""))
-    except InputError:
-        return True
-    return False
 
 
 def _verdicts(readings: Sequence[OrientationReading], witness: Witness, raw: Float | None) -> Iterator[tuple[str, str]]:

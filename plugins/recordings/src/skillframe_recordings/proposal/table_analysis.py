@@ -187,7 +187,15 @@ class Look:
         if "time" in self.told:
             self.said.because.append(f"clock: in {self.told['time']}, as the header says")
         elif not self._has_unit("time"):
-            self._unit_of_time(time)
+            unit = values.unit_of_time(time)
+            if unit is None:
+                self.said.undecided.append(
+                    "the clock's unit: no usual one gives 5 to 5000 samples a second (--set units)"
+                )
+            else:
+                self.units += [unit] if unit != "s" else []
+                rate = 1.0 / (float(np.median(np.diff(time))) * SCALES["time"][unit])
+                self.said.because.append(f"clock: in {unit} its rate is {rate:.4g} Hz")
         return float(time[0]) * self._factor("time"), (time - time[0]) * self._factor("time")
 
     def _rate_beside(self) -> None:
@@ -201,15 +209,6 @@ class Look:
                 self.said.settings["rate"] = f"{rate:.9g}"
                 self.said.because.append(f"clock: {rate:.9g} Hz, since the file says {name} = {value:.9g}")
                 return
-
-    def _unit_of_time(self, time: Float) -> None:
-        unit = values.unit_of_time(time)
-        if unit is None:
-            self.said.undecided.append("the clock's unit: no usual one gives 5 to 5000 samples a second (--set units)")
-            return
-        self.units += [unit] if unit != "s" else []
-        rate = 1.0 / (float(np.median(np.diff(time))) * SCALES["time"][unit])
-        self.said.because.append(f"clock: in {unit} its rate is {rate:.4g} Hz")
 
     def _position(self) -> Float | None:
         position = self._three([self.picks[n] for n in POSITION if n in self.picks])

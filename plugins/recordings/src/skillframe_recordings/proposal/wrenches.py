@@ -90,7 +90,12 @@ def judge_wrench(time: Float, position: Float | None, rotation: Float, force: Fl
         sign = left[0][1]
         reasons.append(f"wrench sign: {sign}; {told}")
     lines = " or ".join(typed(f if len(frames) > 1 else None, s if len(signs) > 1 else None) for f, s in left)
-    weight = _tared(time, rotation, force) if "tool" in frames and frame is None else ""
+    weight = ""
+    if "tool" in frames and frame is None:
+        wrench = np.concatenate([rotate(rotation, force), np.zeros_like(force)], axis=1)
+        quaternion = quaternion_from_matrix(rotation)
+        read = Demonstration(time=time, position=np.zeros_like(force), quaternion=quaternion, wrench=wrench, source="")
+        weight = "".join(f"; in tool axes, {text}" for text in tared(read))
     if len(frames) > 1 and len(signs) > 1 and len(left) < len(pairs):
         excluded = ("base", "environment") not in left
         unsure.append(f"axes and sign of the wrench: {told}: type {lines}{weight}")
@@ -177,10 +182,3 @@ def _by_work(
         f"{shares[f]:+.0%} of |F||dx| in {f} axes" for f in dict.fromkeys(f for f, _ in pairs) if f in shares
     )
     return left, f"its work over the motion in contact is {told}, and what is touched does not push the tool along"
-
-
-def _tared(time: Float, rotation: Float, force: Float) -> str:
-    quaternion = quaternion_from_matrix(rotation)
-    wrench = np.concatenate([rotate(rotation, force), np.zeros_like(force)], axis=1)
-    read = Demonstration(time=time, position=np.zeros_like(force), quaternion=quaternion, wrench=wrench, source="")
-    return "".join(f"; in tool axes, {text}" for text in tared(read))
