@@ -21,7 +21,6 @@ from skillframe_search.plan import Plan, exerted, keyed, plan
 
 FAR = 2.5  # standard deviations of the outer ellipse
 INK, BLUE, RED, GREY = "#1d2025", "#2e6fba", "#d1495b", "#b9bec6"
-STYLE = {"font.family": "DejaVu Sans", "font.size": 10, "svg.fonttype": "none", "svg.hashsalt": "skillframe"}
 
 
 def explain(document: Document) -> list[Illustration]:
@@ -103,7 +102,8 @@ def _forces(phase: Phase) -> Illustration:
 
 def _svg(figure: Figure) -> str:
     text = io.StringIO()
-    with rc_context(STYLE):
+    style = {"font.family": "DejaVu Sans", "font.size": 10, "svg.fonttype": "none", "svg.hashsalt": "skillframe"}
+    with rc_context(style):
         figure.set_layout_engine("constrained")
         figure.savefig(text, format="svg", metadata={"Date": None})
     drawing = text.getvalue()

@@ -19,8 +19,6 @@ from skillframe_search.exploration import CUT, Exploration
 
 BALL = (1.0, 2.0, np.pi, 4.0 * np.pi / 3.0, 0.5 * np.pi**2, 8.0 * np.pi**2 / 15.0)  # volumes of unit balls
 SEEN_M = 0.0008  # nearer than this to the way so far is searched
-FINE_M = 0.0004  # between points of the way so far
-MOST_EXCHANGES = 400
 
 
 def tour(exploration: Exploration, length: float, rng: np.random.Generator, seen_m: float = SEEN_M) -> Float:
@@ -55,7 +53,7 @@ def _unseen(
 def finely(path: Float) -> Float:
     """The way through places, a point every 0.4 mm."""
     travelled = np.concatenate([[0.0], np.cumsum(norm(np.diff(path, axis=0)))])
-    along = np.arange(0.0, travelled[-1] + FINE_M, FINE_M)
+    along = np.arange(0.0, travelled[-1] + 0.0004, 0.0004)  # m
     return np.stack([np.interp(along, travelled, column) for column in path.T], axis=1)
 
 
@@ -86,7 +84,7 @@ def nearest_first(places: Float, here: Float) -> Float:
 def shortened(path: Float, here: Float) -> Float:
     """The path after 2-opt."""
     path = np.vstack([here[None], path])
-    for _ in range(MOST_EXCHANGES):
+    for _ in range(400):  # exchanges at most
         apart = norm(path[:, None] - path[None])
         step = np.append(apart[np.arange(len(path) - 1), np.arange(1, len(path))], 0.0)
         # reversing piece i+1 .. j turns edges (i, i+1), (j, j+1) into (i, j), (i+1, j+1); the end is free
