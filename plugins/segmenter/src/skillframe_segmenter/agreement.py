@@ -12,8 +12,6 @@ from typing import Any
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
 
-HALF_WAY = 0.75
-
 
 def check_agreement(rows: Sequence[Mapping[str, Any]], demonstrations: Sequence[Demonstration]) -> None:
     """Refuse demonstrations that do not belong together.
@@ -48,7 +46,7 @@ def _check_end(name: str, mine: Mapping[str, Any], others: Sequence[Mapping[str,
     last = mine["labels"][-1]
     if any(row["labels"][-1] in mine["labels"] or last not in row["labels"] for row in others):
         return
-    if _time_from(mine, last) < HALF_WAY * min(_time_from(row, last) for row in others):
+    if _time_from(mine, last) < 0.75 * min(_time_from(row, last) for row in others):
         raise InputError(
             name, f"stops half-way: ends in phase {last + 1}, where the others go on to phase "
             f"{others[0]['labels'][-1] + 1}",

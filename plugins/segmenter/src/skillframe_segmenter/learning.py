@@ -25,14 +25,13 @@ from skillframe.frames import norm
 from skillframe_segmenter.agreement import check_agreement
 from skillframe_segmenter.air import Learner, learned_in_air
 from skillframe_segmenter.boards import learn_places, names_places
-from skillframe_segmenter.boundaries import Move, moved, parse_move
+from skillframe_segmenter.boundaries import moved, parse_move
 from skillframe_segmenter.contacts import at_contact
 from skillframe_segmenter.explained import explained
 from skillframe_segmenter.segmentation import refitted
 from skillframe_segmenter.settings import PHASE_MIN_S, PolicySettings, Settings
 from skillframe_segmenter.zvc import ZvcSettings
 
-SHORTEST_S = 0.25
 WRENCHES = "wrench_hmm"
 SAME_PUSH = cos(radians(35.0))
 OWN = ("segmenter", "skill", "phases", "recoveries", "set_boundary", "places")
@@ -74,7 +73,12 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
                 options.axes,
             )  # fmt: skip
     if moves:
-        found = _held(found, demonstrations, moved(found["demonstrations"], moves, names), moves, own, cutting)
+        rows = moved(found["demonstrations"], moves, names)
+        if "phase_of" not in found["phase_model"]:  # no model of micro-phases to fit again
+            found = {**found, "demonstrations": list(rows)}
+        else:
+            found = refitted(found, demonstrations, rows, {m.demonstration for m in moves}, own["phases"], cutting)
+            check_agreement(found["demonstrations"], demonstrations)
     parts = [pieces(found, demonstrations, [k]) for k in range(_count(found))]
     bodies = [learned_in_air(_learner(own["skill"]), each, options) for each in parts]
     return {
@@ -112,18 +116,6 @@ def _sorted(options: LearnOptions) -> tuple[dict[str, Any], dict[str, Any], dict
     return own, {**cutting, "at": options.at, "axes": options.axes}, learning
 
 
-def _held(
-    found: Document, demonstrations: Sequence[Demonstration], rows: Sequence[Document], moves: Sequence[Move],
-    own: Mapping[str, Any], cutting: Mapping[str, Any],
-) -> Document:  # fmt: skip
-    """The segmentation with the user's boundaries, a model of micro-phases fitted again."""
-    if "phase_of" not in found["phase_model"]:
-        return {**found, "demonstrations": list(rows)}
-    again = refitted(found, demonstrations, rows, {m.demonstration for m in moves}, own["phases"], cutting)
-    check_agreement(again["demonstrations"], demonstrations)
-    return again
-
-
 def _two(
     demonstrations: Sequence[Demonstration], rows: Sequence[Document], fit: Fit, cutting: Mapping[str, Any]
 ) -> Document:  # fmt: skip
@@ -153,7 +145,7 @@ def pieces(found: Document, demonstrations: Sequence[Demonstration], phases: Seq
                 joins = bool(spans) and spans[-1][1] == start
                 spans = [*spans[:-1], (spans[-1][0], stop)] if joins else [*spans, (start, stop)]
         result += [demonstration.between(*span) for span in spans]
-    long = [piece for piece in result if piece.duration >= SHORTEST_S]
+    long = [piece for piece in result if piece.duration >= 0.25]  # s
     return long or result
 
 

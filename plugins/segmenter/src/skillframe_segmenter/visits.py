@@ -28,7 +28,7 @@ from skillframe.errors import InputError
 from skillframe.frames import Float, Pose, norm, unit
 
 BASE = "base"
-FAR_M, NEAR_M, ALIKE_M, ALIKE = 0.04, 0.008, 0.001, 2.0
+FAR_M, NEAR_M = 0.04, 0.008
 TIP = "tip"
 
 
@@ -101,7 +101,7 @@ def belongs_to(
     """The place that points (D, 3) belong to: of those that explain them best, the nearest."""
     away = {name: float(norm(_seen(points, [each[name] for each in places])).mean()) for name in names}
     least = min(scatter.values(), default=0.0)
-    alike = [name for name in names if scatter.get(name, 0.0) <= max(ALIKE * least, least + ALIKE_M)]
+    alike = [name for name in names if scatter.get(name, 0.0) <= max(2.0 * least, least + 0.001)]
     return min(alike, key=lambda name: away[name]) if alike else BASE
 
 
