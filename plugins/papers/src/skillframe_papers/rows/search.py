@@ -174,14 +174,10 @@ def _hits(tried: Tried, time: float) -> Ran:
 HEAD = ("goal", "method", *(f"at {b:g} s" for b in BUDGETS), "found in the end")
 
 
-def _goals(job: RowRun, method: Method) -> int:
-    """Goals of a method in row 13."""
-    first = method in (WALK, ERGODIC)
-    return job.count(FIRST_GOALS if first else GOALS, QUICK_GOALS)
-
-
 def _asked(job: RowRun, task: str, methods: Iterable[Method]) -> list[Asked]:
-    return [Asked(task, each, _goals(job, each)) for each in methods]
+    """Methods with their goals in row 13."""
+    most = {WALK: FIRST_GOALS, ERGODIC: FIRST_GOALS}
+    return [Asked(task, each, job.count(most.get(each, GOALS), QUICK_GOALS)) for each in methods]
 
 
 def _all_quick(job: RowRun) -> list[Asked]:
