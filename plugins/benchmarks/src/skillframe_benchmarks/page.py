@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from importlib.resources import files
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from skillframe_reports.markup import Markup, data_uri, join, note, table, tag
@@ -129,10 +128,8 @@ def _figure(found: Found) -> Markup:
     shown = table(("level", "method", "seated", "not seated"), rows, numeric=9) if rows else ""
     none = [join([tag("br"), f"{method}: {why}"]) for method, why in found.unlearned.items()]
     below = tag("figcaption", said, tag("br"), found.refused, *none)
-    return tag("figure", tag("h4", found.name), _picture(found.picture), below, shown)
-
-
-def _picture(path: Path) -> Markup:
-    if not path.exists():
-        return join([])
-    return tag("img", src=data_uri("image/png", path.read_bytes()), alt="the parts, cut open", loading="lazy")
+    picture = join([])
+    if found.picture.exists():
+        source = data_uri("image/png", found.picture.read_bytes())
+        picture = tag("img", src=source, alt="the parts, cut open", loading="lazy")
+    return tag("figure", tag("h4", found.name), picture, below, shown)

@@ -95,7 +95,7 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     widest = 0.75 * float(np.sqrt(found.covariance[-1][-1])) if settings.layers > 1 else 0.0
     turns = np.linspace(-widest, widest, settings.layers) if settings.layers > 1 else np.zeros(1)
     phase = Phase(
-        push=Push(direction=_vector(push), force=gains.push),
+        push=Push(direction=(float(push[0]), float(push[1]), float(push[2])), force=gains.push),
         searched=found.coordinates,
         exploration=None if baseline else found,
         forces=None if baseline or settings.feedforward == "constant" else model,
@@ -141,11 +141,6 @@ def _held(friction: float | None, asked: Gains, gains: Gains) -> dict[str, Any]:
         return {}
     said = {"friction": friction, "dead_band_m": dead_band(friction, gains)}
     return said if gains == asked else {**said, "freed_from": [asked.push, asked.stiffness, dead_band(friction, asked)]}
-
-
-def _vector(values: Float) -> tuple[float, float, float]:
-    x, y, z = (float(v) for v in values)
-    return (x, y, z)
 
 
 def plain(value: Any) -> Any:
