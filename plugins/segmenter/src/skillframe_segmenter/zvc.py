@@ -20,7 +20,7 @@ from skillframe.config import build
 from skillframe.demonstration.record import Demonstration
 from skillframe.errors import InputError
 from skillframe.extend.records import Document
-from skillframe.frames import Float, norm
+from skillframe.frames import norm
 from skillframe_segmenter import runs
 from skillframe_segmenter.features import typical_speeds
 from skillframe_segmenter.segmentation import rows_of, successors
@@ -84,7 +84,8 @@ def _labels(cut: Windows, settings: ZvcSettings, phases: int | None) -> NDArray[
 
 def _stops(cut: Windows, share: float) -> list[int]:
     typical = typical_speeds([cut], cut)
-    speeds = [_smoothed(norm(cut.motion[:, part])) for part in (slice(0, 3), slice(3, 6))]
+    padded = [np.pad(norm(cut.motion[:, part]), 2, mode="edge") for part in (slice(0, 3), slice(3, 6))]
+    speeds = [np.convolve(each, np.ones(5) / 5, mode="valid") for each in padded]  # over five windows
     still = (speeds[0] < share * typical[0]) & (speeds[1] < share * typical[1])
     starts = runs.starts_of_runs(still.astype(np.intp))
     ends = np.append(starts[1:], cut.size)
@@ -92,7 +93,3 @@ def _stops(cut: Windows, share: float) -> list[int]:
         int(a + b) // 2 for a, b in zip(starts, ends, strict=True)
         if still[a] and b - a >= SHORTEST and a > 0 and b < cut.size
     ]  # fmt: skip
-
-
-def _smoothed(values: Float) -> Float:
-    return np.convolve(np.pad(values, 2, mode="edge"), np.ones(5) / 5, mode="valid")  # over five windows

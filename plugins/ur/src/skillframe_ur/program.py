@@ -107,7 +107,6 @@ def program(document: Document, robot: RobotSpec, lines: Sequence[str]) -> str:
         f"{phase.stop.force_limit_n:g} N, {phase.stop.time_limit_s * pace:.1f} s or {phase.stop.travel_limit_m:.3g} m",
         f"centre of compliance {_list(frame.center_of_compliance)} m in the flange's frame; units m, rad, N, Nm, s",
     ]
-    # characters
     head = "".join(f"# {part}\n" for line in about for part in wrap(line, 116))
     return head + _filled(TEMPLATE.read_text(encoding="utf-8"), values)
 
