@@ -30,9 +30,9 @@ def explain(document: Document) -> list[Illustration]:
     turning = "turn" in phase.searched
     figure = Figure(figsize=(9.6 if turning else 5.6, 4.8))
     panels = figure.subplots(1, 2, squeeze=False)[0] if turning else [figure.add_subplot()]
-    _panel(panels[0], phase, trajectory, 0, 1)
+    _panel(panels[0], phase, trajectory, 1)
     if turning:
-        _panel(panels[1], phase, trajectory, 0, len(phase.searched) - 1)
+        _panel(panels[1], phase, trajectory, len(phase.searched) - 1)
     caption = (
         f"Grey: the tool of the blindfolded teacher, relative to its start. Ellipses: one and {FAR:g} "
         f"standard deviations of the Gaussian fitted to it. Blue: one search, {1e3 * trajectory.length:.0f} mm in "
@@ -44,8 +44,8 @@ def explain(document: Document) -> list[Illustration]:
     return found if phase.forces is None else [*found, _forces(phase)]
 
 
-def _panel(canvas: Axes, phase: Phase, trajectory: Plan, first: int, second: int) -> None:
-    pair = [first, min(second, len(phase.searched) - 1)]
+def _panel(canvas: Axes, phase: Phase, trajectory: Plan, second: int) -> None:
+    pair = [0, min(second, len(phase.searched) - 1)]
     factor = np.array([degrees(1.0) if _turns(phase, i) else 1e3 for i in pair])
     places = np.array(phase.evidence.get("places", [])).reshape(-1, len(phase.searched))
     canvas.plot(*(places[:, pair] * factor).T, ".", color=GREY, ms=3)

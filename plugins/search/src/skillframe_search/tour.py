@@ -21,13 +21,13 @@ BALL = (1.0, 2.0, np.pi, 4.0 * np.pi / 3.0, 0.5 * np.pi**2, 8.0 * np.pi**2 / 15.
 SEEN_M = 0.0008  # nearer than this to the way so far is searched
 
 
-def tour(exploration: Exploration, length: float, rng: np.random.Generator, seen_m: float = SEEN_M) -> Float:
+def tour(exploration: Exploration, length: float, rng: np.random.Generator) -> Float:
     """(n, k) places in the order of the visit [m], from the start (zero), at least `length` metres long."""
     path, travelled = np.zeros((1, len(exploration.mean))), 0.0
     while travelled < length:
         wanted = min(0.06, length - travelled)  # length of a round's tour
         cut = reach(exploration, travelled + wanted)
-        added = _round(partial(_unseen, exploration, rng, finely(path), seen_m, cut), path[-1], wanted)
+        added = _round(partial(_unseen, exploration, rng, finely(path), cut), path[-1], wanted)
         travelled += _length(added, path[-1])
         path = np.concatenate([path, added])
     return path
@@ -41,13 +41,11 @@ def reach(exploration: Exploration, length: float) -> float:
     return float(np.clip((looked / volume) ** (1.0 / k), 1.0, CUT))
 
 
-def _unseen(
-    exploration: Exploration, rng: np.random.Generator, seen: Float, seen_m: float, cut: float, count: int
-) -> Float:
+def _unseen(exploration: Exploration, rng: np.random.Generator, seen: Float, cut: float, count: int) -> Float:
     """Samples away from the way so far, or any where most of it has been searched."""
     places = exploration.draw(rng, 4 * count, cut)
     apart = np.sqrt(((places[:, None] - seen[None]) ** 2).sum(axis=2).min(axis=1))
-    return np.concatenate([places[apart > seen_m], places[apart <= seen_m]])[:count]
+    return np.concatenate([places[apart > SEEN_M], places[apart <= SEEN_M]])[:count]
 
 
 def finely(path: Float) -> Float:

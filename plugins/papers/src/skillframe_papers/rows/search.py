@@ -86,10 +86,10 @@ CENTRED = "a centred spiral that nobody taught"
 NO_FORCES = "the same search, a constant push"
 
 
-def shown_by(job: RowRun, task: Task, count: int = 5) -> tuple[Demonstration, ...]:
-    """`count` demonstrations of a task, in a quick run three of 4 s."""
+def shown_by(job: RowRun, task: Task) -> tuple[Demonstration, ...]:
+    """Five demonstrations of a task, in a quick run three of 4 s."""
     seed = 1 + job.seed
-    return demonstrations(task, 3, seed, 4.0) if job.quick else demonstrations(task, count, seed)
+    return demonstrations(task, 3, seed, 4.0) if job.quick else demonstrations(task, 5, seed)
 
 
 def budget_of(job: RowRun) -> float:

@@ -107,9 +107,9 @@ def stepped(skill: Skill, observation: Observation, tick: int) -> Command:
         ) from error
 
 
-def lead_of(skill: SkillType, document: Document, trials: int = TRIALS) -> tuple[int, ...]:
+def lead_of(skill: SkillType, document: Document) -> tuple[int, ...]:
     """(N,), or (N, arms) for a coordinator."""
-    return trials, *arms_of(skill, document)
+    return TRIALS, *arms_of(skill, document)
 
 
 class Standing(Skill):
