@@ -115,6 +115,12 @@ class Supplies:
         """Pressures (N, L) of the lines at their actuators (N, k), and `other` (N, k) where none is declared."""
         return np.where(self._is_fed, pressure[:, self._line], other)
 
+    def _sums(self) -> tuple[Float, Float]:
+        """Flows taken from the lines, and their slopes (N, L)."""
+        fed = self.lines.feeds > 0.0  # an actuator that no line feeds may not tell its flow
+        taken, slope = (np.where(fed, each[:, None], 0.0).sum(axis=-1) for each in self._y[:2])
+        return taken, slope
+
     def _relieves(self, pressure: Float) -> tuple[Float, Float]:
         """Relief's flow and slope (N, L)."""
         over = pressure - 1.1 * self._rated
@@ -143,9 +149,7 @@ class Supplies:
 
     def end(self) -> None:
         """Correct the pressures by what the actuators took."""
-        lines = self.lines
-        fed = lines.feeds > 0.0  # an actuator that no line feeds may not tell its flow
-        taken, slope = (np.where(fed, each[:, None], 0.0).sum(axis=-1) for each in self._y[:2])
+        lines, (taken, slope) = self.lines, self._sums()
         there, middle = self._there, self._middle
         taken_there = taken + slope * (there - middle)
         asked = 0.5 * (self._asked + self._wanted(taken_there, there))

@@ -9,7 +9,7 @@ way into a corner; in free air a push that leans on the friction cone explains t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby, pairwise
 from math import cos, inf, radians
@@ -35,10 +35,6 @@ from skillframe_segmenter.zvc import ZvcSettings
 WRENCHES = "wrench_hmm"
 SAME_PUSH = cos(radians(35.0))
 OWN = ("segmenter", "skill", "phases", "recoveries", "set_boundary", "places")
-
-
-Fit = Callable[[Sequence[Demonstration], int | None, Mapping[str, Any]], Document]
-
 BETWEEN = ("recoveries", "set_boundary", "places")  # settings of the whole policy, not of a place
 
 
@@ -68,10 +64,7 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     if own["phases"] is None:
         found = _joined(found, demonstrations, own["skill"], options, stand_ins=True)
         if found["phase_model"].get("type") == WRENCHES and not moves:
-            found = at_contact(
-                found, demonstrations, lambda rows: _two(demonstrations, rows, segmenter.fit, cutting), options.at,
-                options.axes,
-            )  # fmt: skip
+            found = at_contact(found, demonstrations, segmenter.fit, cutting)
     if moves:
         rows = moved(found["demonstrations"], moves, names)
         if "phase_of" not in found["phase_model"]:  # no model of micro-phases to fit again
@@ -114,17 +107,6 @@ def _sorted(options: LearnOptions) -> tuple[dict[str, Any], dict[str, Any], dict
         if value is not None and (not isinstance(value, int) or isinstance(value, bool) or value < 0):
             raise InputError(f"--set {key}", f"{value!r} is not a whole number", "give one")
     return own, {**cutting, "at": options.at, "axes": options.axes}, learning
-
-
-def _two(
-    demonstrations: Sequence[Demonstration], rows: Sequence[Document], fit: Fit, cutting: Mapping[str, Any]
-) -> Document:  # fmt: skip
-    """A model of two phases, fitted with all demonstrations held to their rows."""
-    two = fit(demonstrations, 2, cutting)
-    if len(two["phase_model"]["phase_of"]) != 2:
-        raise InputError("contact", "is no two phases of the model", "name the number of phases")
-    apart = {**two, "phase_model": {**two["phase_model"], "phase_of": [0, 1]}}
-    return refitted(apart, demonstrations, rows, set(range(len(rows))), 2, cutting)
 
 
 def _count(found: Document) -> int:
