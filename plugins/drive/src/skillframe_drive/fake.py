@@ -191,7 +191,12 @@ class FakeController(ABC):
         due = time.perf_counter()
         while not until():
             self.serve()
-            self._plant_faults()
+            if self._due("protective_stop"):
+                self.protect("planted")
+            if self._due("stall"):
+                time.sleep(2.0 * SILENT_S)
+            if self._due("cut"):
+                self.cut()
             self._press()
             self.step()
             self._cycle += 1
@@ -229,14 +234,6 @@ class FakeController(ABC):
         if self.faults.get("tool_axes"):
             force, torque = force @ rotation, torque @ rotation
         return np.concatenate([force, torque])
-
-    def _plant_faults(self) -> None:
-        if self._due("protective_stop"):
-            self.protect("planted")
-        if self._due("stall"):
-            time.sleep(2.0 * SILENT_S)
-        if self._due("cut"):
-            self.cut()
 
     def _due(self, fault: str) -> bool:
         """Whether a fault happens now. It happens once."""
