@@ -252,7 +252,7 @@ class Seating(Composition):
         return result
 
     def _look(self, observation: Observation, running: NDArray[np.bool_]) -> None:
-        """End pushes that stalled or ended, and searches that sank; past the end return, as often as may be tried."""
+        """End pushes that stalled or ended, and searches that sank. Return from past the end while tries are left."""
         time = observation.time
         here = running & (self._status == RUNNING)
         if self._due is not None:
