@@ -25,14 +25,14 @@ from skillframe.frames import Float, rotation_matrix
 
 MODELS = (Path("aic_assets/models"), Path("models"), Path())
 """Folders of the models: in a checkout of the published repository, in its assets, or directly."""
-STRAIGHT, NANO = 1e-5, 9
-"""Tolerance of right angles [rad] and digits of places [m], so that boxes share faces."""
+NANO = 9
+"""Digits of places [m], so that boxes share faces."""
 THICK = 1.01 * THIN
 """Least thickness of a plate [m], which contact needs."""
-LET_PASS, NOTHING, STEP = 1e-5, 1e-7, 1e-5
-"""Overlap that is accepted, that counts as none, and steps of the plug until it rests [m]."""
-HIGHEST, LOWEST = 2e-4, -3e-3
-"""Range about the published place [m], as published boxes overlap or leave room below the plug."""
+LET_PASS, STEP = 1e-5, 1e-5
+"""Overlap that is accepted, and steps of the plug until it rests [m]."""
+HIGHEST = 2e-4
+"""Above the published place [m], as published boxes overlap; or leave room below the plug, for 3 mm at most."""
 FIXTURE = """\
 summary = "AI for Industry Challenge, {name}"
 [fixture]
@@ -98,7 +98,7 @@ def _rest(plug: Any, port: Any, name: str) -> float:
     if not _free(plug, port, height, LET_PASS):
         what = f"plug and port overlap even {1000.0 * HIGHEST:g} mm above where they are published"
         raise InputError(name, what, "give the models as they are published")
-    while height > LOWEST and _free(plug, port, height - STEP, NOTHING):
+    while height > -3e-3 and _free(plug, port, height - STEP, 1e-7):  # 0.1 um counts as no overlap
         height -= STEP
     return round(height, NANO)
 
@@ -134,7 +134,7 @@ def _in_frame(path: Path, body: str, frame: str) -> tuple[list[Shape], float]:
 def _straight(rotation: Float) -> Float:
     """A rotation (3, 3), by exact right angles where nearly so."""
     near: Float = np.round(rotation)
-    return near if np.abs(rotation - near).max() < STRAIGHT else rotation
+    return near if np.abs(rotation - near).max() < 1e-5 else rotation  # rad, so that boxes share faces
 
 
 def _thickened(path: Path, link: DrawnLink) -> list[Shape]:

@@ -17,7 +17,7 @@ from skillframe.campaign import is_trial
 from skillframe_benchmarks.assembly import DONE, REFUSED, TRIALS, UNLEARNED, Level, by_level
 from skillframe_benchmarks.scores import passes
 
-DRAWS, OFTEN, FEWEST = 4000, 0.8, 5
+OFTEN = 0.8
 """Bootstrap samples, share of successes of a solved assembly (published: 80 %), and fewest assemblies for an interval.
 """
 NOT_LEARNED = "not learned"
@@ -140,8 +140,8 @@ def share(cells: Sequence[Cell], checked: bool = False) -> Share:
     hits = [float((cell.checked or 0) if checked else cell.seated) for cell in cells]
     rates = np.array([n / cell.trials if cell.trials else float("nan") for n, cell in zip(hits, cells, strict=True)])
     low = high = None
-    if len(rates) >= FEWEST:
+    if len(rates) >= 5:  # fewer assemblies give no interval
         rng = np.random.default_rng(0)  # of the interval alone
-        means = rng.choice(rates, (DRAWS, len(rates))).mean(axis=1)
+        means = rng.choice(rates, (4000, len(rates))).mean(axis=1)  # bootstrap samples
         low, high = (float(each) for each in np.quantile(means, (0.025, 0.975)))
     return Share(float(rates.mean()), low, high, int((rates >= OFTEN).sum()), len(rates))

@@ -18,13 +18,8 @@ from skillframe.frames import Float, matrix_from_quaternion, norm
 if TYPE_CHECKING:
     from skillframe.execution import Trace
 
-WINDOW, ORDER = 15, 2
-"""Samples and degree of the local polynomial of the velocity."""
-MOVING_M_S, ROUGH = 0.01, 50.0
-"""Speed from which jerk counts [m/s], and the jerk that earns nothing [m/s^3]."""
-FORCE_N, FORCE_S = 20.0, 1.0
-"""A force above this [N] for longer than that [s] costs points."""
-QUICK_S, SLOW_S, DETOUR_M = 5.0, 60.0, 1.0
+WINDOW = 15
+"""Samples of the local polynomial of the velocity, of second degree."""
 ASIDE_M = 0.005
 """Largest distance from the port's axis, along x and along y, of a part inside [m]."""
 
@@ -34,17 +29,17 @@ def jerk(trace: Trace) -> float:
     from scipy.signal import savgol_filter
 
     velocity = trace.twist[:, :3]
-    moves = norm(velocity) > MOVING_M_S
+    moves = norm(velocity) > 0.01  # jerk counts from this speed on [m/s]
     if len(velocity) < WINDOW or not moves.any() or not np.isfinite(velocity).all():
         return math.nan
     step = float(np.median(np.diff(trace.time)))
-    return float(norm(savgol_filter(velocity, WINDOW, ORDER, deriv=2, delta=step, axis=0))[moves].mean())
+    return float(norm(savgol_filter(velocity, WINDOW, 2, deriv=2, delta=step, axis=0))[moves].mean())
 
 
 def force_time(trace: Trace) -> float:
     """Longest continuous time with a measured force above 20 N [s]."""
     longest, since = 0.0, None
-    for time, high in zip(trace.time.tolist(), (norm(trace.wrench[:, :3]) > FORCE_N).tolist(), strict=True):
+    for time, high in zip(trace.time.tolist(), (norm(trace.wrench[:, :3]) > 20.0).tolist(), strict=True):
         since = (time if since is None else since) if high else None
         longest = max(longest, 0.0 if since is None else time - since)
     return longest
@@ -74,18 +69,16 @@ def points(trace: Trace) -> float:
     else:
         start, short = float(np.linalg.norm(tip[-1] - tip[0])), 0.0
     third = 75.0 if meta["success"] else short
-    penalty = 12.0 * (force_time(trace) > FORCE_S) + 24.0 * bool(meta.get("touched"))
-    return 1.0 + third - penalty + (_motion(trace, start) if third > 0.0 else 0.0)
-
-
-def _motion(trace: Trace, start: float) -> float:
-    """Second tier without penalties, where a trial too short for a jerk did not move."""
-    rough = jerk(trace)
-    return (
-        6.0 * _left(0.0 if math.isnan(rough) else rough, 0.0, ROUGH)
-        + 12.0 * _left(float(trace.meta["duration_s"]), QUICK_S, SLOW_S)
-        + 6.0 * _left(path(trace), start, start + DETOUR_M)
-    )
+    penalty = 12.0 * (force_time(trace) > 1.0) + 24.0 * bool(meta.get("touched"))  # longer than 1 s
+    motion = 0.0  # second tier without penalties; m/s^3, s and m, where a trial too short for a jerk did not move
+    if third > 0.0:
+        rough = jerk(trace)
+        motion = (
+            6.0 * _left(0.0 if math.isnan(rough) else rough, 0.0, 50.0)
+            + 12.0 * _left(float(meta["duration_s"]), 5.0, 60.0)
+            + 6.0 * _left(path(trace), start, start + 1.0)
+        )
+    return 1.0 + third - penalty + motion
 
 
 def _short_of_success(tip: Float, deep: float, far: float) -> float:

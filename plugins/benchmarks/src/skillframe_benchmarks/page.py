@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from importlib.resources import files
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from skillframe_reports.markup import Markup, data_uri, join, note, table, tag
@@ -13,7 +12,7 @@ from skillframe_reports.shell import POLICY
 
 from skillframe_benchmarks.assembly import Level, Plan
 from skillframe_benchmarks.assets import DEVELOPED
-from skillframe_benchmarks.counts import OFTEN, Cell, Found, Share, share
+from skillframe_benchmarks.counts import OFTEN, Found, Share, share
 
 HEAD = ("level", "assemblies", "method", "seated", "95 % interval", ">= 80 %", "published check")
 GROUPS = ("developed on", "untouched")
@@ -116,25 +115,21 @@ def render(found: Sequence[Found], given: Sequence[Total], plan: Plan, count: in
     return "<!DOCTYPE html>\n" + tag("html", head, body, lang="en")
 
 
-def _seated(cell: Cell) -> str:
-    return f"{cell.seated} of {cell.trials}" + (f", {cell.refused} starts refused" if cell.refused else "")
-
-
 def _figure(found: Found) -> Markup:
     parts = found.parts
     said = f"{1e3 * parts['depth_m']:.3g} mm deep, {1e3 * parts['clearance_m']:.2g} mm of play" if parts else ""
     rows = [
-        (tag("span", level, class_="level"), method, tag("span", _seated(cell), class_="level"),
+        (tag("span", level, class_="level"), method,
+         tag("span", f"{cell.seated} of {cell.trials}{f', {cell.refused} starts refused' * bool(cell.refused)}",
+             class_="level"),
          ", ".join(f"{n} {c}" for c, n in cell.causes.items()))
         for (level, method), cell in found.cells.items()
     ]  # fmt: skip
     shown = table(("level", "method", "seated", "not seated"), rows, numeric=9) if rows else ""
     none = [join([tag("br"), f"{method}: {why}"]) for method, why in found.unlearned.items()]
     below = tag("figcaption", said, tag("br"), found.refused, *none)
-    return tag("figure", tag("h4", found.name), _picture(found.picture), below, shown)
-
-
-def _picture(path: Path) -> Markup:
-    if not path.exists():
-        return join([])
-    return tag("img", src=data_uri("image/png", path.read_bytes()), alt="the parts, cut open", loading="lazy")
+    picture = join([])
+    if found.picture.exists():
+        source = data_uri("image/png", found.picture.read_bytes())
+        picture = tag("img", src=source, alt="the parts, cut open", loading="lazy")
+    return tag("figure", tag("h4", found.name), picture, below, shown)

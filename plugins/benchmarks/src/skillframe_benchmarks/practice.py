@@ -28,8 +28,6 @@ from skillframe.demonstration import Demonstration
 from skillframe.errors import InputError, SkillframeWarning
 from skillframe.files import write_whole
 
-TRIAL_S = 15.0
-"""Longest trial [s]."""
 FIXTURE, REMOVAL, SKILL, TRIALS = "fixture.toml", "removal.npz", "seat.skill.json", "trials"
 PLAN, CERTIFY = "campaign.toml", "certify.toml"
 YAW = "fixture.tilt_z"
@@ -139,7 +137,7 @@ def tried(folder: Path, practice: Practice, notify: Callable[[Progress], None]) 
         error = f"within {1e3 * practice.shift:g} mm and {math.degrees(practice.tilt):g} degrees"
         text = CAMPAIGN.format(
             name=json.dumps(f"{folder.resolve().name}: {error}"), seed=practice.seed, trials=practice.trials,
-            robot=json.dumps(practice.robot), world=FIXTURE, skill=SKILL, seconds=TRIAL_S,
+            robot=json.dumps(practice.robot), world=FIXTURE, skill=SKILL, seconds=15.0,
         )  # fmt: skip
         ranges = [f'"{name}" = {{ uniform = [{-most}, {most}] }}\n' for name, most in practice.most.items() if most]
         write_whole(folder / PLAN, (text + "".join(ranges)).encode())

@@ -110,7 +110,7 @@ def run(
             _confirm()
         done = run_once(
             learned, task, link, coc=coc, slow=slow, dry=dry, duration_s=duration, rate_hz=rate,
-            done=_ask if task.cell.witness == "person" else None,
+            done=partial(click.confirm, "Is the task done?", err=True) if task.cell.witness == "person" else None,
         )  # fmt: skip
     finally:
         link.close()
@@ -236,10 +236,6 @@ def _confirm() -> None:
 
     if click.prompt(f"The robot will move. Type {CONFIRMATION}", err=True) != CONFIRMATION:
         raise SkillframeError("not confirmed: the robot was not moved")
-
-
-def _ask() -> bool:
-    return click.confirm("Is the task done?", err=True)
 
 
 @command.command()

@@ -32,10 +32,6 @@ FAULTS = {
     "press": "[N] an operator presses the tip, from 5 s after a client came: down, then along base x and y, 2 s each",
 }
 """What can be planted in a fake, and the values."""
-STALL_S = 2.0 * SILENT_S
-"""Silence of a stalled fake [s]."""
-LATE_S = 0.05
-"""Delay [s] after which a fake in real time gives its schedule up and begins a new one."""
 PRESSES = ((5.0, 7.0, 2, -1.0), (10.0, 12.0, 0, 1.0), (15.0, 17.0, 1, 1.0))
 """Begin and end [s] after a client came, base axis and sign of the force of each press."""
 
@@ -193,7 +189,12 @@ class FakeController(ABC):
         due = time.perf_counter()
         while not until():
             self.serve()
-            self._plant_faults()
+            if self._due("protective_stop"):
+                self.protect("planted")
+            if self._due("stall"):
+                time.sleep(2.0 * SILENT_S)
+            if self._due("cut"):
+                self.cut()
             self._press()
             self.step()
             self._cycle += 1
@@ -203,7 +204,7 @@ class FakeController(ABC):
                 due = time.perf_counter()
             elif (left := due - time.perf_counter()) > 0.0:
                 time.sleep(left)
-            elif left < -LATE_S:
+            elif left < -0.05:  # too late: begin a new schedule
                 due = time.perf_counter()
 
     def taken(self) -> None:
@@ -231,14 +232,6 @@ class FakeController(ABC):
         if self.faults.get("tool_axes"):
             force, torque = force @ rotation, torque @ rotation
         return np.concatenate([force, torque])
-
-    def _plant_faults(self) -> None:
-        if self._due("protective_stop"):
-            self.protect("planted")
-        if self._due("stall"):
-            time.sleep(STALL_S)
-        if self._due("cut"):
-            self.cut()
 
     def _due(self, fault: str) -> bool:
         """Whether a fault happens now. It happens once."""

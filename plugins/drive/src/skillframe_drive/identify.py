@@ -234,7 +234,10 @@ def identify(task: Task, link: Link, say: Callable[[str], None]) -> Identified:
             response = _response(robot)
         else:
             say("each joint moves by 1 degree to and fro")
-            _add_friction(found, _friction(robot))
+            friction = _friction(robot)
+            text = ", ".join(f"{each:.2f}" for each in friction)
+            found.lines.append(Line(f"friction that is left in the joints: {text} N m"))
+            found.vary["robot.joint_friction"] = [0.0, _up(float(np.abs(friction).max()))]
         say("the tool turns by 14 degrees to four sides")
         turned = _turned(robot)
     finally:
@@ -312,13 +315,6 @@ def _add_response(found: Identified, response: Response, control: Control) -> No
         problem = "the damping in contact would be too small: write the lines below into robot.toml and certify again"
     found.lines.append(Line(text, problem))
     found.robot.update(delay_s=round(response.delay_s, 3), bandwidth_hz=float(f"{response.bandwidth_hz:.3g}"))
-
-
-def _add_friction(found: Identified, friction: Float) -> None:
-    most = float(np.abs(friction).max())
-    text = ", ".join(f"{each:.2f}" for each in friction)
-    found.lines.append(Line(f"friction that is left in the joints: {text} N m"))
-    found.vary["robot.joint_friction"] = [0.0, _up(most)]
 
 
 def _add_sensor(found: Identified, sensor: Sensor) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,6 @@ from skillframe.errors import InputError, SkillframeError
 from skillframe.execution import (
     SIMULATED,
     PacedSkill,
-    Setup,
     force_source,
     load_robot_model,
     load_world,
@@ -30,14 +28,6 @@ from skillframe.world import Scene, start_configurations
 from skillframe_drive.cell import Cell
 from skillframe_drive.link import INTERFACES, Link, RobotState
 from skillframe_drive.real import drive_type
-
-CLOCK_SHARE = 0.02
-"""Largest deviation of the robot's rate from the link's."""
-START_RAD = 0.05
-"""Largest distance of a joint from the start [rad]."""
-STILL_RAD_S = 0.01
-"""Largest joint speed of a robot at rest [rad/s]."""
-LOOKED_S = 0.4
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,18 +85,18 @@ def check(task: Task, link: Link, *, anywhere: bool = False) -> list[Line]:
         anywhere: the robot need not be at its start.
     """
     states: list[RobotState] = [link.read()]
-    while not link.fault and states[-1].time - states[0].time < LOOKED_S:
+    while not link.fault and states[-1].time - states[0].time < 0.4:
         states.append(link.read())
     if link.fault:
         return [Line("the robot is connected", link.fault)]
     rate = (len(states) - 1 + link.missed) / (states[-1].time - states[0].time)
     lines = [Line(f"{rate:.0f} states a second")]
-    if abs(rate * link.period - 1.0) > CLOCK_SHARE:
+    if abs(rate * link.period - 1.0) > 0.02:  # of the link's rate
         lines[0] = Line(lines[0].text, f"the link expects {1.0 / link.period:.0f}")
     speed = float(np.abs([each.velocity for each in states]).max())
-    lines.append(Line(f"at rest, joints below {speed:.3f} rad/s", "" if speed < STILL_RAD_S else "the robot moves"))
+    lines.append(Line(f"at rest, joints below {speed:.3f} rad/s", "" if speed < 0.01 else "the robot moves"))
     away = np.abs(states[-1].position - task.start)
-    there = anywhere or away.max() < START_RAD
+    there = anywhere or away.max() < 0.05
     far = f"joint {np.argmax(away) + 1} is {away.max():.3f} rad from the start of {task.cell.world}"
     lines.append(Line(far, "" if there else "move the robot to its start first: robot.toml's [home]"))
     wrenches = np.array([each.wrench for each in states])
@@ -136,7 +126,10 @@ def run_once(
         SkillframeError: the skill cannot run on this robot.
     """
     runnable, setup = prepare(task.robot, task.scene, skill.document, coc)
-    setup = replace(_limited(setup, task.cell), drive=drive_type(link, task.believed, dry=dry))
+    spec = setup.robot.spec
+    lowest = min(each for each in (task.cell.force_n, spec.limits.force_n) if each is not None)
+    robot = replace(setup.robot, spec=replace(spec, limits=replace(spec.limits, force_n=lowest)))
+    setup = replace(setup, robot=robot, drive=drive_type(link, task.believed, dry=dry))
     slowed: Skill = runnable if slow == 1.0 else Slowed(runnable, 1, 1.0 / slow)
     result = simulate(slowed, setup, {}, [np.random.default_rng()], duration_s=duration_s / slow, trace_hz=rate_hz)
     assert result.traces is not None
@@ -149,7 +142,11 @@ def run_once(
     for key in ("failure", "reason"):
         trace.meta[key] = trace.meta[key].replace(SIMULATED, force_source(trace.meta))
     if done is not None and not dry:
-        _judge(trace.meta, done())
+        meta, said = trace.meta, done()  # the person decides, unless a limit was broken or the link failed
+        broken = meta["ended_by"] not in ("skill", "time", "goal")
+        meta["goal_reached"] = said
+        meta["success"] = said and not broken and meta["status"] != "FAILURE"
+        meta["failure"] = "" if meta["success"] else (meta["failure"] or "the person says that it is not done")
     return SingleRun(trace=trace, interrupted=result.interrupted)
 
 
@@ -160,22 +157,6 @@ class Slowed(PacedSkill):
         """The command, with its speed divided by the pace."""
         command = super().step(observation)
         return command._replace(twist=command.twist / self._pace)
-
-
-def _limited(setup: Setup, cell: Cell) -> Setup:
-    """The set-up with the cell's force limit, if it is the lower one."""
-    spec = setup.robot.spec
-    lowest = min(each for each in (cell.force_n, spec.limits.force_n) if each is not None)
-    limits = replace(spec.limits, force_n=lowest)
-    return replace(setup, robot=replace(setup.robot, spec=replace(spec, limits=limits)))
-
-
-def _judge(meta: dict[str, Any], done: bool) -> None:
-    """Success as the person says, unless a limit was broken or the link failed."""
-    broken = meta["ended_by"] not in ("skill", "time", "goal")
-    meta["goal_reached"] = done
-    meta["success"] = done and not broken and meta["status"] != "FAILURE"
-    meta["failure"] = "" if meta["success"] else (meta["failure"] or "the person says that it is not done")
 
 
 def refuse_problems(lines: list[Line]) -> None:

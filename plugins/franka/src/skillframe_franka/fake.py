@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from skillframe_drive.fake import FakeArm, FakeController
 
-PORT, VERSION, JOINTS = 1337, 10, 7
+VERSION, JOINTS = 10, 7
 PERIOD_S = 1e-3
 MOST_MISSED = 20
 """Commands that may be missing in a row."""
@@ -62,7 +62,7 @@ class FakeFranka(FakeController):
         super().__init__(arm, PERIOD_S, lockstep=lockstep, faults=faults, say=say)
         self._listening = socket.socket()
         self._listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        self._listening.bind((host, PORT))
+        self._listening.bind((host, 1337))
         self._listening.listen(1)
         self._listening.setblocking(False)
         self._udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)

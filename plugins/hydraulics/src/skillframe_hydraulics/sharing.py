@@ -69,7 +69,10 @@ class FlowSharing:
         if not self._shares.any():
             return command
         self._set_pace(terms)
-        self._append(command.pose.position, command.twist[:, :3])
+        given = command.pose.position
+        moved = (self._path[self._last % self._length, self._rows, :3] != given).any(axis=1) | (self._last < 0)
+        self._last = self._last + moved
+        self._path[self._last % self._length, self._rows] = np.concatenate([given, command.twist[:, :3]], axis=1)
         self._at = np.clip(self._at + self.pace, self._last - (self._length - 2), self._last)
         before = np.floor(self._at).astype(np.int64)
         part = (self._at - before)[:, None]
@@ -78,11 +81,6 @@ class FlowSharing:
         twist = command.twist.copy()
         twist[:, :3] = self.pace[:, None] * here[:, 3:]
         return command._replace(pose=Pose(position, command.pose.rotation), twist=twist)
-
-    def _append(self, position: Float, velocity: Float) -> None:
-        moved = (self._path[self._last % self._length, self._rows, :3] != position).any(axis=1) | (self._last < 0)
-        self._last = self._last + moved
-        self._path[self._last % self._length, self._rows] = np.concatenate([position, velocity], axis=1)
 
     def _set_pace(self, terms: Terms) -> None:
         s, supplies = self.settings, self._supplies

@@ -34,8 +34,6 @@ NEEDED_IN, NEEDED_OUT = "supply_drop", ("flow_supply", "supply_slope")
 """Input and outputs of an actuator that is fed by a declared supply."""
 OPEN = 2e-3
 """Opening of a valve, share of its travel, from which on a load-sensing pump senses the pressure of its chamber."""
-FULL = 0.98
-"""Share of its largest flow from which on a pump counts as full."""
 
 
 class Lines(NamedTuple):
@@ -123,13 +121,6 @@ class Supplies:
         taken, slope = (np.where(fed, each[:, None], 0.0).sum(axis=-1) for each in self._y[:2])
         return taken, slope
 
-    def _load(self) -> Float:
-        """Largest pressure (N, L) of the chambers that open valves feed, 0 with all shut."""
-        spool, pressure_a, pressure_b = self._y[2:]
-        felt = np.where(np.abs(spool) - self._deadband > OPEN, np.where(spool > 0.0, pressure_a, pressure_b), 0.0)
-        largest: Float = np.max(felt[:, None] * self.lines.feeds, axis=-1)
-        return largest
-
     def _relieves(self, pressure: Float) -> tuple[Float, Float]:
         """Relief's flow and slope (N, L)."""
         over = pressure - 1.1 * self._rated
@@ -137,7 +128,10 @@ class Supplies:
 
     def _wanted(self, taken: Float, pressure: Float) -> Float:
         """Q_w (N, L) within the pump's limits."""
-        target = np.minimum(self._load() + self.lines.margin, self._rated)
+        spool, pressure_a, pressure_b = self._y[2:]  # of the chambers that open valves feed, 0 with all shut
+        felt = np.where(np.abs(spool) - self._deadband > OPEN, np.where(spool > 0.0, pressure_a, pressure_b), 0.0)
+        largest: Float = np.max(felt[:, None] * self.lines.feeds, axis=-1)
+        target = np.minimum(largest + self.lines.margin, self._rated)
         gain = 0.5 * self.lines.softness / self.lines.response
         return np.clip(taken + gain * (target - pressure), 0.0, self.lines.most(pressure))
 
@@ -167,7 +161,7 @@ class Supplies:
         self.taken, self._slope, self.flow = taken + slope * (self.pressure - middle), slope, flow
         self.relieved = self._relieves(self.pressure)[0]
         self.time += self.dt
-        full = flow >= FULL * lines.most(self.pressure)
+        full = flow >= 0.98 * lines.most(self.pressure)  # counts as full
         self.full += self.dt * full
         self.first = np.where(full & np.isnan(self.first), self.time, self.first)
         self.lowest = np.where(full, np.minimum(self.lowest, self.pressure), self.lowest)

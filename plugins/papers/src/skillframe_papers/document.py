@@ -32,7 +32,7 @@ def body(entries: Sequence[Mapping[str, Any]]) -> str:
         f"{_count(entries, 'reported')} reported without a verdict. All rows took {wall:.1f} minutes of wall time and "
         f"{cpu:.1f} minutes of processor time. {SAID}", "",
         _row(HEAD), _row(["---"] * len(HEAD)),
-        *(_row([_shown(key, each[key]) for key in keys]) for each in entries),
+        *(_row([with_intervals(each[key]) if key == "ours" else each[key] for key in keys]) for each in entries),
     ]  # fmt: skip
     for each in entries:
         lines += ["", *_details(each)]
@@ -60,10 +60,6 @@ def _count(entries: Sequence[Mapping[str, Any]], verdict: str) -> int:
 
 def _row(cells: Sequence[object]) -> str:
     return f"| {' | '.join(_cell(cell) for cell in cells)} |"
-
-
-def _shown(key: str, value: object) -> object:
-    return with_intervals(value) if key == "ours" else value
 
 
 def _cell(value: object) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 from skillframe.config import coerce
 from skillframe.errors import UnknownName
-from skillframe.extend import Registry, RowType
+from skillframe.extend import Registry
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -74,16 +74,12 @@ def jobs_of(
     for key in changed:
         if key not in known:
             raise UnknownName("setting", key, known, "of the rows to be computed")
-    versions = [registry.provider("row", row.name).version for row in types]
-    return [_job(row, changed, seed, quick, version) for row, version in zip(types, versions, strict=True)]
-
-
-def _job(row: RowType, changed: Mapping[str, Any], seed: int, quick: bool, version: str) -> Job:
-    own = {
-        key: coerce(value, type(row.settings[key]), f"--set {key}") for key, value in changed.items()
-        if key in row.settings
-    }  # fmt: skip
-    return Job(
-        row=row.name, settings={**row.settings, **own}, changed=own, seed=seed, quick=quick, version=version,
-        group=row.group or row.name,
-    )  # fmt: skip
+    jobs = []
+    for row in types:
+        mine = {key: value for key, value in changed.items() if key in row.settings}
+        own = {key: coerce(value, type(row.settings[key]), f"--set {key}") for key, value in mine.items()}
+        jobs.append(Job(
+            row=row.name, settings={**row.settings, **own}, changed=own, seed=seed, quick=quick,
+            version=registry.provider("row", row.name).version, group=row.group or row.name,
+        ))  # fmt: skip
+    return jobs

@@ -25,7 +25,6 @@ EVERY = 2
 """Periods between two states."""
 PATIENCE_S = 3.0
 """In lockstep: longest real time to wait for a target."""
-POLL_S = 1e-4
 BASE, TIP, FINGER = "base", "tip", "finger_joint"
 STARTED: dict[str, bool | float | str] = {
     **{f"task.k_{axis}": 4000.0 if axis.startswith("pos") else 200.0 for axis in law.AXES},
@@ -103,18 +102,14 @@ class FakeCrisp(FakeController):
         until = time.perf_counter() + (PATIENCE_S if self.lockstep and self._wanted() else 0.0)
         while not self._heard():
             if time.perf_counter() >= until or not self._led():
-                self._late()
+                if self._wanted():  # a state was not answered: the law goes on with the last targets
+                    self.missing += 1
+                    self._moving = not self.lockstep and self._led()
                 return
-            time.sleep(POLL_S)
+            time.sleep(1e-4)
 
     def _wanted(self) -> bool:
         return self._moving and self._cycle % EVERY == 0
-
-    def _late(self) -> None:
-        """A state was not answered. The law goes on with the last targets."""
-        if self._wanted():
-            self.missing += 1
-            self._moving = not self.lockstep and self._led()
 
     def _heard(self) -> bool:
         """Answer calls, and take targets. Whether a new target pose came."""

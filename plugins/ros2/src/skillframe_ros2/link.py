@@ -21,8 +21,6 @@ WAIT_S = 3.0
 """Time to wait for the robot's nodes, and for their answers while nothing moves [s]."""
 CALL_S = 0.1
 """Time to wait for an answer during a run [s]."""
-LOOK_READS = 50
-"""States between two looks for other publishers of targets: 100 ms."""
 APART = 1e-3, 0.01
 """Largest distance [m] and angle [rad] of the end-effector frame from the centre of compliance and the tool's axes."""
 OTHERS = "another program publishes /target_pose, and the controller ignores targets of two: end it"
@@ -148,7 +146,8 @@ class Ros2Link:
                 self._waits.wait(self._silent)
         self._take(message)
         self._reads += 1
-        if self._reads % LOOK_READS == 0 and len(self._targets.get_matched_publications()) > 1:
+        # every 100 ms, for other publishers of targets
+        if self._reads % 50 == 0 and len(self._targets.get_matched_publications()) > 1:
             self.fault = OTHERS
         return self._seen
 

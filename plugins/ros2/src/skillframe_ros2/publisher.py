@@ -25,8 +25,6 @@ from skillframe_ros2.messages import NEWEST, Header, PoseStamped, WrenchStamped,
 from skillframe_ros2.topics import TARGET_POSE, TARGET_WRENCH
 
 LAYOUT = struct.Struct("<?20d")
-SENT_S = 0.3
-"""Time that reliable messages have to arrive [s], before the process ends."""
 
 
 class Targets(NamedTuple):
@@ -76,7 +74,7 @@ def main(host: str) -> int:
     if held.watched:
         wrench.write(wrench_message(Header(), np.zeros(6)))
         pose.write(pose_message(Header(), held.measured))
-    time.sleep(SENT_S)
+    time.sleep(0.3)  # so that reliable messages arrive before the process ends
     return int(held.watched)
 
 

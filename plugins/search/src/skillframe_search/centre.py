@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from skillframe.frames import Float, Pose, dot, norm
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons, rows_of
 
-SPEED, ACROSS, TURN = 0.02, 4000.0, 3.0  # m/s, N/m, Nm/rad: the default search's
-SETTLE_S, SMOOTHING_S, THERE_M = 0.1, 0.02, 2e-4
+SPEED, ACROSS = 0.02, 4000.0  # m/s, N/m: the default search's
 ROWS = ("_back", "_length", "_began", "_felt", "_status", "_reason")
 
 
@@ -36,7 +35,8 @@ class Centre(Skill):
         self._ends, self._way, self._most, self._pressed = ends, way, most_n, pressed
         across = np.eye(3) - pressed * np.outer(way, way)
         self._stiffness = np.zeros((6, 6))
-        self._stiffness[:3, :3], self._stiffness[3:, 3:] = ACROSS * across, TURN * np.eye(3)
+        # Nm/rad, as the default search's
+        self._stiffness[:3, :3], self._stiffness[3:, 3:] = ACROSS * across, 3.0 * np.eye(3)
 
     def start(self, observation: Observation, rngs: Sequence[np.random.Generator]) -> None:
         """Plan the way back."""
@@ -63,10 +63,11 @@ class Centre(Skill):
         """The next command."""
         gone = SPEED * (observation.time - self._began)
         held = -(observation.wrench[:, :3] * self._back).sum(axis=1)
-        self._felt += (held - self._felt) * (observation.dt / (SMOOTHING_S + observation.dt))
+        self._felt += (held - self._felt) * (observation.dt / (0.02 + observation.dt))  # over 20 ms
         farthest = self._length + self._most / ACROSS
         moved = ((observation.pose.position - self._home.position) * self._back).sum(axis=1)
-        done = (self._felt > self._most) | (moved > self._length - THERE_M) | (gone > farthest + SPEED * SETTLE_S)
+        # there: 0.2 mm before the axis, or 0.1 s after the target has stopped
+        done = (self._felt > self._most) | (moved > self._length - 2e-4) | (gone > farthest + SPEED * 0.1)
         for i in np.flatnonzero(done & (self._status == Status.RUNNING)).tolist():
             drawn = 1e3 * float((observation.pose.position[i] - self._home.position[i]) @ self._back[i])
             held_words = f", held with {self._felt[i]:.0f} N" if self._felt[i] > self._most else ""

@@ -17,7 +17,6 @@ from skillframe.errors import InputError
 from skillframe.frames import Float, cross, move_wrench, norm, rotate, rotate_spatial, rotation_vector, unit
 
 BIN_S = 0.04
-FALLEN_M, BEFORE_S = 0.002, 0.2  # m below the surface is in the hole, s cut before that
 
 
 class Samples(NamedTuple):
@@ -92,9 +91,9 @@ def in_contact(found: Samples, push: Float, least: float) -> Samples:
     pressed = -(found.wrench[:, :3] @ push) > least
     depth = found.place[:, :3] @ push
     if pressed.any():
-        fallen = np.flatnonzero(depth > np.median(depth[pressed]) + FALLEN_M)
+        fallen = np.flatnonzero(depth > np.median(depth[pressed]) + 0.002)  # 2 mm below the surface is in the hole
         if len(fallen):
-            pressed[max(int(fallen[0]) - round(BEFORE_S / BIN_S), 0) :] = False
+            pressed[max(int(fallen[0]) - round(0.2 / BIN_S), 0) :] = False  # 0.2 s before that are cut, too
     return found.rows(pressed)
 
 

@@ -33,7 +33,9 @@ def describe(document: Document) -> list[str]:
         *_where(phase),
         f"follow {way}, {bounds}, stiffness {phase.stiffness.translation:g} N/m across the push and none along it",
         *_held(phase),
-        _forces(phase),
+        "press and exert nothing more"
+        if phase.forces is None
+        else f"exert the forces demonstrated at the same velocity ({len(phase.forces.weights)} components)",
         f"done when {1e3 * phase.stop.drop_m:.3g} mm deeper than the surface and the answer to the push was lost; "
         f"failed after {phase.stop.time_s:g} s of search",
     ]
@@ -61,9 +63,3 @@ def _held(phase: Phase) -> list[str]:
         push, stiffness, band = seen["freed_from"]
         line += f"; it would be {1e3 * band:.1f} mm with the {push:.1f} N demonstrated and {stiffness:g} N/m"
     return [line]
-
-
-def _forces(phase: Phase) -> str:
-    if phase.forces is None:
-        return "press and exert nothing more"
-    return f"exert the forces demonstrated at the same velocity ({len(phase.forces.weights)} components)"

@@ -17,9 +17,9 @@ import numpy as np
 
 from skillframe.frames import Float, norm
 from skillframe_search.exploration import Exploration
+from skillframe_search.smoothing import STEP_S
 
 REACH = 3.2  # standard deviations
-STEP_S = 0.02
 ORDERS = {1: 20, 2: 10, 3: 7, 4: 4, 5: 3}  # basis functions per axis
 
 

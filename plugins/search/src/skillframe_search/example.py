@@ -8,8 +8,7 @@ from skillframe.demonstration import Demonstration
 from skillframe.extend import Document, LearnOptions
 from skillframe.frames import Float
 
-RATE, SECONDS = 100.0, 20.0
-PUSH, FRICTION = 10.0, 0.2
+RATE, PUSH = 100.0, 10.0  # Hz, N
 
 
 def example(algorithm: str = "sampling") -> Document:
@@ -21,12 +20,10 @@ def example(algorithm: str = "sampling") -> Document:
     return learned(registry().skill("search"), [searching()], LearnOptions(settings=settings))
 
 
-def searching(
-    seed: int = 3, deviation: tuple[float, float] = (0.004, 0.004), friction: float = FRICTION
-) -> Demonstration:
+def searching(seed: int = 3, deviation: tuple[float, float] = (0.004, 0.004), friction: float = 0.2) -> Demonstration:
     """20 s of an Ornstein-Uhlenbeck search of a plane with Coulomb friction and no sensor noise."""
     rng = np.random.default_rng(seed)
-    time = np.arange(0.0, SECONDS, 1.0 / RATE)
+    time = np.arange(0.0, 20.0, 1.0 / RATE)
     position = np.zeros((len(time), 3))
     position[:, :2] = _wander(rng, len(time)) * deviation
     velocity: Float = np.asarray(np.gradient(position, 1.0 / RATE, axis=0))

@@ -18,7 +18,6 @@ from skillframe_search.contact import Samples
 
 COORDINATES = ("across_1", "across_2", "tilt_1", "tilt_2", "turn")
 LEVER = 0.023  # m per rad
-LEAST_M, LEAST_RAD = 5e-4, radians(1.0)
 CUT = 3.5  # standard deviations: the limit of the search
 
 
@@ -77,7 +76,7 @@ def explored(samples: Samples, axes: Float) -> Exploration:
         InputError: none of the coordinates was searched.
     """
     values = coordinates_of(samples.place, axes)
-    least = np.array([LEAST_M, LEAST_M, LEAST_RAD, LEAST_RAD, LEAST_RAD])
+    least = np.array([5e-4, 5e-4, radians(1.0), radians(1.0), radians(1.0)])  # m, rad
     columns = np.flatnonzero(values.std(axis=0) > least)
     if not len(columns):
         raise InputError(

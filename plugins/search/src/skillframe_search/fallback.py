@@ -20,9 +20,6 @@ from skillframe_search.phase import Dither, Path, Phase, Push, Stiffness, Stop
 from skillframe_search.simple import there_and_back
 from skillframe_search.smoothing import STEP_S
 
-DITHER = Dither(tilt_nm=0.2, tilt_hz=4.0, turn_nm=0.3, turn_hz=3.0)
-STOP = {"touch_n": 1.5, "approach_speed": 0.01, "lost_share": 0.5, "force_limit_n": 60.0}
-
 
 def strategy(stalled: Stalled) -> Document:
     """Body of a search: learned from blind demonstrations, else the default.
@@ -52,8 +49,11 @@ def strategy(stalled: Stalled) -> Document:
     phase = Phase(
         push=Push(direction=stalled.way, force=gains.push), searched=("across_1", "across_2"), exploration=None,
         forces=None, path=path, stiffness=Stiffness(translation=gains.stiffness, rotation=3.0, turn=5.0),
-        stop=Stop(time_s=float(np.ceil(len(way) * STEP_S)), drop_m=drop, **STOP),
-        dither=DITHER,
+        stop=Stop(
+            time_s=float(np.ceil(len(way) * STEP_S)), drop_m=drop, touch_n=1.5, approach_speed=0.01, lost_share=0.5,
+            force_limit_n=60.0,
+        ),
+        dither=Dither(tilt_nm=0.2, tilt_hz=4.0, turn_nm=0.3, turn_hz=3.0),
         evidence={"friction": stalled.friction, "dead_band_m": held},
     )  # fmt: skip
     body: dict[str, Any] = plain(asdict(phase))

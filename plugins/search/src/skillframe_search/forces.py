@@ -16,8 +16,6 @@ import numpy as np
 
 from skillframe.frames import Float
 
-FLOOR = 1e-3  # of each standardised variance, against collapse
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ForceModel:
@@ -95,7 +93,7 @@ def _expectation_maximisation(
         weights, means = mass / mass.sum(), (share.T @ data) / mass[:, None]
         away = data[:, None] - means
         covariances = np.einsum("nk,nki,nkj->kij", share, away, away, optimize=True) / mass[:, None, None]
-        covariances = covariances + FLOOR * np.eye(d)
+        covariances = covariances + 1e-3 * np.eye(d)  # against collapse, of standardised variances
     return weights, means, covariances, likelihood
 
 

@@ -91,11 +91,16 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
         speed = float(np.clip(np.median(moving) if len(moving) else slowest, slowest, fastest))
     if settings.layers < 1 or (settings.layers > 1 and found.coordinates[-1] != "turn"):
         raise InputError("--set layers", f"{settings.layers} layers need a search that turns", "give 1")
+    held: dict[str, Any] = {}  # effect of friction, and the gains before `freed`
+    if friction is not None:
+        held = {"friction": friction, "dead_band_m": dead_band(friction, gains)}
+        if gains != asked:
+            held["freed_from"] = [asked.push, asked.stiffness, dead_band(friction, asked)]
     # the spiral's layers: 0, then turns to both sides within 3/4 standard deviation
     widest = 0.75 * float(np.sqrt(found.covariance[-1][-1])) if settings.layers > 1 else 0.0
     turns = np.linspace(-widest, widest, settings.layers) if settings.layers > 1 else np.zeros(1)
     phase = Phase(
-        push=Push(direction=_vector(push), force=gains.push),
+        push=Push(direction=(float(push[0]), float(push[1]), float(push[2])), force=gains.push),
         searched=found.coordinates,
         exploration=None if baseline else found,
         forces=None if baseline or settings.feedforward == "constant" else model,
@@ -110,7 +115,7 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
         ),
         stiffness=Stiffness(translation=gains.stiffness, rotation=settings.turn_stiffness),
         stop=Stop(time_s=settings.time, drop_m=settings.drop),
-        evidence={**_evidence(every, parts, push, across, criterion, looked), **_held(friction, asked, gains)},
+        evidence={**_evidence(every, parts, push, across, criterion, looked), **held},
     )
     body = {"frame": frame, "phases": [plain(asdict(phase))], "settings": asdict(settings)}
     return body
@@ -133,19 +138,6 @@ def _evidence(
         "criterion": criterion,
         "places": np.round(looked[:: len(looked) // 300 + 1], 5).tolist(),  # places for the picture
     }
-
-
-def _held(friction: float | None, asked: Gains, gains: Gains) -> dict[str, Any]:
-    """Effect of friction, and the gains before `freed`."""
-    if friction is None:
-        return {}
-    said = {"friction": friction, "dead_band_m": dead_band(friction, gains)}
-    return said if gains == asked else {**said, "freed_from": [asked.push, asked.stiffness, dead_band(friction, asked)]}
-
-
-def _vector(values: Float) -> tuple[float, float, float]:
-    x, y, z = (float(v) for v in values)
-    return (x, y, z)
 
 
 def plain(value: Any) -> Any:

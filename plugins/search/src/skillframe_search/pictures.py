@@ -21,7 +21,6 @@ from skillframe_search.plan import Plan, exerted, keyed, plan
 
 FAR = 2.5  # standard deviations of the outer ellipse
 INK, BLUE, RED, GREY = "#1d2025", "#2e6fba", "#d1495b", "#b9bec6"
-STYLE = {"font.family": "DejaVu Sans", "font.size": 10, "svg.fonttype": "none", "svg.hashsalt": "skillframe"}
 
 
 def explain(document: Document) -> list[Illustration]:
@@ -31,9 +30,9 @@ def explain(document: Document) -> list[Illustration]:
     turning = "turn" in phase.searched
     figure = Figure(figsize=(9.6 if turning else 5.6, 4.8))
     panels = figure.subplots(1, 2, squeeze=False)[0] if turning else [figure.add_subplot()]
-    _panel(panels[0], phase, trajectory, 0, 1)
+    _panel(panels[0], phase, trajectory, 1)
     if turning:
-        _panel(panels[1], phase, trajectory, 0, len(phase.searched) - 1)
+        _panel(panels[1], phase, trajectory, len(phase.searched) - 1)
     caption = (
         f"Grey: the tool of the blindfolded teacher, relative to its start. Ellipses: one and {FAR:g} "
         f"standard deviations of the Gaussian fitted to it. Blue: one search, {1e3 * trajectory.length:.0f} mm in "
@@ -45,8 +44,8 @@ def explain(document: Document) -> list[Illustration]:
     return found if phase.forces is None else [*found, _forces(phase)]
 
 
-def _panel(canvas: Axes, phase: Phase, trajectory: Plan, first: int, second: int) -> None:
-    pair = [first, min(second, len(phase.searched) - 1)]
+def _panel(canvas: Axes, phase: Phase, trajectory: Plan, second: int) -> None:
+    pair = [0, min(second, len(phase.searched) - 1)]
     factor = np.array([degrees(1.0) if _turns(phase, i) else 1e3 for i in pair])
     places = np.array(phase.evidence.get("places", [])).reshape(-1, len(phase.searched))
     canvas.plot(*(places[:, pair] * factor).T, ".", color=GREY, ms=3)
@@ -103,7 +102,8 @@ def _forces(phase: Phase) -> Illustration:
 
 def _svg(figure: Figure) -> str:
     text = io.StringIO()
-    with rc_context(STYLE):
+    style = {"font.family": "DejaVu Sans", "font.size": 10, "svg.fonttype": "none", "svg.hashsalt": "skillframe"}
+    with rc_context(style):
         figure.set_layout_engine("constrained")
         figure.savefig(text, format="svg", metadata={"Date": None})
     drawing = text.getvalue()

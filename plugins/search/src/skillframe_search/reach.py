@@ -2,8 +2,8 @@ r"""Skill that moves to a pose in free air: out of the hole first, then straight
 
     x_d = x_0 + u (along the legs),    R_d = exp(s rho) R_0,    s: share of the way, rho: turn to the goal's orientation
 
-The first leg lifts the tool to the height of the goal, against the way in. On the second, more than `TOUCH_N` ends the
-motion with success, since the next part works in contact.
+The first leg lifts the tool to the height of the goal, against the way in. On the second, more than 4 N end the motion
+with success, since the next part works in contact.
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ from skillframe.frames import Float, Pose, dot, norm, rotation_matrix, rotation_
 from skillframe.skill import Command, Impedance, Observation, Skill, Status, no_reasons, rows_of
 
 STIFF = np.diag([1000.0] * 3 + [20.0] * 3)  # N/m, Nm/rad
-TOUCH_N = 4.0
 ROWS = ("_began", "_first", "_second", "_turn", "_felt", "_status", "_reason", "_raised")
 
 
@@ -70,13 +69,14 @@ class Reach(Skill):
         across = norm(self._second)
         gone = self._speed * (observation.time - self._began)
         lifted, moved = np.minimum(gone, self._raised), np.clip(gone - self._raised, 0.0, across)
-        first, second = (_along(*leg) for leg in ((self._first, self._raised, lifted), (self._second, across, moved)))
+        first = self._first * (lifted / np.maximum(self._raised, 1e-9))[:, None]
+        second = self._second * (moved / np.maximum(across, 1e-9))[:, None]
         total = np.maximum(self._raised + across, 1e-9)
         share = np.clip(gone / np.maximum(total, 0.02), 0.0, 1.0)
         rotation = rotation_matrix(share[:, None] * self._turn) @ self._home.rotation
         force = observation.wrench[:, :3]
         self._felt += (-dot(force, self._way) - self._felt) * (observation.dt / (0.01 + observation.dt))  # over 10 ms
-        touched = (moved > 0.0) & (self._felt > TOUCH_N)
+        touched = (moved > 0.0) & (self._felt > 4.0)
         there = gone > np.maximum(total, 0.02) + 0.3 * self._speed  # rests 0.3 s
         for i in np.flatnonzero((self._status == Status.RUNNING) & (touched | there)).tolist():
             self._status[i] = Status.SUCCESS
@@ -84,8 +84,3 @@ class Reach(Skill):
         pose = Pose(self._home.position + first + second, rotation)
         zero = np.zeros((len(gone), 6))
         return Command(pose, zero, Impedance(STIFF), zero, self._status.copy(), self._reason.copy())
-
-
-def _along(leg: Float, length: Float, gone: Float) -> Float:
-    result: Float = leg * (gone / np.maximum(length, 1e-9))[:, None]
-    return result

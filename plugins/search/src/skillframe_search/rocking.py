@@ -21,10 +21,9 @@ from skillframe_search.contact import surface_axes
 from skillframe_search.handling import Handling
 from skillframe_search.seat_document import Seat
 
-MOST_TURNS, LEAST_TURNS = 6.0, 1.5
 MEAN_S, TIP_NMS_RAD = 1.0, 0.5
 AFTER_S = 0.2  # that the spiral stays at its widest before a stall
-LEAST_LEVER_M, LEAST_PITCH = 1e-4, 1e-4
+LEAST_LEVER_M = 1e-4
 SETTLE_AFTER_S, RISES, FALLS = 0.1, 8.0, 1.2  # share of settling: rises within 1/8, falls from 1/6 to the end
 
 
@@ -113,12 +112,12 @@ class Rocking:
     def _pitch(self, deep: Float, most: Float) -> Float:
         """(N,) increase of the spiral per turn [rad]."""
         lever = np.maximum(self._seat.contact_m + deep, LEAST_LEVER_M)
-        least = np.maximum(most / MOST_TURNS, LEAST_PITCH)
+        least = np.maximum(most / 6.0, 1e-4)  # 6 turns cover the range at most [rad a turn]
         result: Float = np.maximum(self._how.tip_pitch_m / lever, least)
         return result
 
     def _is_deep(self, pitch: Float, most: Float) -> NDArray[np.bool_]:
-        result: NDArray[np.bool_] = pitch < most / LEAST_TURNS
+        result: NDArray[np.bool_] = pitch < most / 1.5
         return result
 
     def _round(self, size: Float, phase: Float) -> Float:

@@ -251,7 +251,7 @@ class Seating(Composition):
         return result
 
     def _look(self, observation: Observation, running: NDArray[np.bool_]) -> None:
-        """Find pushes that stalled, ended or passed the end, and searches that sank."""
+        """End pushes that stalled or ended, and searches that sank. Return from past the end while tries are left."""
         time = observation.time
         here = running & (self._status == RUNNING)
         if self._due is not None:
@@ -271,7 +271,12 @@ class Seating(Composition):
             deeper = 1e3 * float(self._deep[i] - self._rim[i])
             self.leave(i, float(time[i]), Status.SUCCESS, f"sank {deeper:.1f} mm")
         for i in _rows(lost):
-            self._return(i, float(time[i]))
+            past = f"went {1e3 * self._deep[i]:.1f} mm past the end, so it missed the hole"
+            self._tried[i] += 1
+            if self._tried[i] > self._seat.tries:
+                self._status[i], self._reason[i] = Status.FAILURE, f"{self.parts[self.current[i]].name}: {past}"
+            else:
+                self.switch(i, APPROACH, float(time[i]), f"lifts and returns, as the tool {past}")
 
     def _settled(self, observation: Observation, idle: Float) -> NDArray[np.bool_]:
         """(N,) whether parts near the end have rested for `idle` [s] and stopped turning."""
@@ -286,14 +291,6 @@ class Seating(Composition):
         result = (since >= REST_S) & ((time - self._stands >= REST_S) | (since >= MOST_TURNING_S))
         return result
 
-    def _return(self, row: int, time: float) -> None:
-        past = f"went {1e3 * self._deep[row]:.1f} mm past the end, so it missed the hole"
-        self._tried[row] += 1
-        if self._tried[row] > self._seat.tries:
-            self._status[row], self._reason[row] = Status.FAILURE, f"{self.parts[self.current[row]].name}: {past}"
-            return
-        self.switch(row, APPROACH, time, f"lifts and returns, as the tool {past}")
-
     def _enter(self, observation: Observation, due: NDArray[np.intp]) -> None:
         """Begin a search about the nominal axis, and a push in an orientation within the fixture's error."""
         position, rotation = observation.pose.position.copy(), observation.pose.rotation.copy()
@@ -302,14 +299,10 @@ class Seating(Composition):
         position[rows] = self._ends[rows] + self._deep[rows, None] * self._way
         rotation[rows] = self._upright
         rows = np.flatnonzero(due == PUSHING)
-        rotation[rows] = self._within(rows, rotation[rows])
-        super()._enter(observation._replace(pose=Pose(position, rotation)), due)
-
-    def _within(self, rows: NDArray[np.intp], rotation: Float) -> Float:
-        """Orientations (M, 3, 3) of rows limited to their fixture's error."""
-        turn = rotation_vector(rotation @ self._upright.T)
+        turn = rotation_vector(rotation[rows] @ self._upright.T)
         share = np.minimum(1.0, self._most_tilt()[rows] / np.maximum(norm(turn), 1e-9))
-        return rotation_matrix(share[:, None] * turn) @ self._upright
+        rotation[rows] = rotation_matrix(share[:, None] * turn) @ self._upright
+        super()._enter(observation._replace(pose=Pose(position, rotation)), due)
 
     def _in_hole(self) -> NDArray[np.bool_]:
         """Trials that have been searched for, or stalled below the first contact."""
@@ -351,18 +344,13 @@ class Seating(Composition):
         tilt = self._most_tilt()
         added[:, 3:] += self._rocking.torque(observation, idle, self._deep, resting, self._urged, tilt)
         if not seat.stop_m:
-            self._settle(added, observation, np.where(self._deep < -how.short_m, 0.0, self._rocking.settling(idle)))
+            share = np.where(self._deep < -how.short_m, 0.0, self._rocking.settling(idle))
+            if np.count_nonzero(share):
+                back = self._ends + self._deep[:, None] * self._way - observation.pose.position
+                pull = share * np.minimum(ACROSS, how.settle_n / np.maximum(self._off, 1e-9))
+                added[:, :3] += pull[:, None] * back
+                added[:, 3:] += self._rocking.settle(observation.time, share)
         return np.where(pushing[:, None], added, 0.0)
-
-    def _settle(self, added: Float, observation: Observation, share: Float) -> None:
-        """Add the settling wrench to (N, 6), each row its share (N,) of the most."""
-        if not np.count_nonzero(share):
-            return
-        how = self._how
-        back = self._ends + self._deep[:, None] * self._way - observation.pose.position
-        pull = share * np.minimum(ACROSS, how.settle_n / np.maximum(self._off, 1e-9))
-        added[:, :3] += pull[:, None] * back
-        added[:, 3:] += self._rocking.settle(observation.time, share)
 
     def _entered(self) -> NDArray[np.bool_]:
         # below the first contact is in the hole: rocked before a search

@@ -36,19 +36,18 @@ from skillframe_search.learner import plain
 from skillframe_search.seat_document import Seat, as_phase
 from skillframe_search.straight import straight_push
 
-BEFORE_S = 0.3  # before the contact that the push is learned with
 LEAST_M = 0.002  # from the first contact to the end
 SCREWED = radians(15.0)  # mean turn about the way from contact to end; more is a screw
 STRAIGHT = 0.15  # of its length: deviation of a straight way from its line
-RESTED_S, RESTED_M = 0.1, 0.0005  # rest at the end in contact, where the way is shorter
+RESTED_S = 0.1  # of rest at the end in contact, where the way is shorter
 SLID = np.cos(radians(30.0))  # between that way and the one in contact; more is no insertion
-FREE_N, STOP_M = 3.6, 0.001
-"""Less than FREE_N [N] at rest at all ends: nothing stops the part, and the push fades over STOP_M [m].
+FREE_N = 3.6
+"""Less than FREE_N [N] at rest at all ends: nothing stops the part, and the push fades over the last millimetre.
 
 Of AutoMate's parts, unstopped ones showed up to 3.1 N, stopped ones 4.2 N and more; a wrong decision fails nearly all
 trials."""
-PRESSED_S, SAME_M, RESTING_M_S = 0.1, 3e-4, 1e-3
-"""Duration, distance from the end and speed of a press [s, m, m/s]."""
+PRESSED_S, SAME_M = 0.1, 3e-4
+"""Duration of a press, and its distance from the end [s, m]."""
 PREFIX = "search_"
 
 
@@ -197,12 +196,12 @@ def _shown(demonstration: Demonstration, point: Float) -> Shown:
     first = int(np.searchsorted(demonstration.time, began))
     last, force = demonstration.time >= max(began, contacts[-1][1] - RESTED_S), -demonstration.wrench[:, :3]
     moved = float(norm(position[last][0] - position[last][-1]))
-    rested = contacts[-1][1] - began >= RESTED_S and moved < RESTED_M
+    rested = contacts[-1][1] - began >= RESTED_S and moved < 0.0005
     brief = LEAST_M if rested else 0.0
     return Shown(
         position[0], way_begins(position, first, brief), position[-1], pose.rotation[-1],
         force[last].mean(axis=0) * rested, demonstration.time, position, force,
-        demonstration.between(began - BEFORE_S, None),
+        demonstration.between(began - 0.3, None),  # the push is learned with 0.3 s before contact
     )  # fmt: skip
 
 
@@ -239,7 +238,7 @@ def _pressed_at_end(shown: Shown, way: Float) -> float:
         return np.inf
     along, force = shown.position @ way, np.cumsum(np.concatenate([[0.0], shown.force @ way]))
     moved = np.abs(along[window:] - along[:-window])
-    there = (along[window:] > along[-1] - SAME_M) & (moved < RESTING_M_S * PRESSED_S)
+    there = (along[window:] > along[-1] - SAME_M) & (moved < 1e-3 * PRESSED_S)  # m/s
     mean = (force[window:] - force[:-window])[1:] / window
     return float(mean[there].max()) if there.any() else np.inf
 
@@ -290,7 +289,12 @@ def seat_of(shown: Sequence[Shown], point: Float, settings: SeatSettings) -> Sea
         )  # fmt: skip
     way = unit(end - contact)
     if not settings.round:
-        _goes_straight(shown, way)
+        turned = [rotation_vector(s.orientation @ s.part.pose.rotation[0].T) @ way for s in shown]
+        if (mean := abs(float(np.mean(turned)))) > SCREWED:
+            raise InputError(
+                "learn", f"the part was turned by {degrees(mean):.0f} degrees about its way, which a seating does not "
+                "do", "leave --skill seat out, and the push learns the turn; or --set round=true, if it is a round peg",
+            )  # fmt: skip
     free = all(_pressed_at_end(each, way) < FREE_N for each in shown)
     if settings.removal:
         free = not settings.stopped
@@ -299,13 +303,13 @@ def seat_of(shown: Sequence[Shown], point: Float, settings: SeatSettings) -> Sea
         further = max(float((each.end - end - (each.start - start) * moved) @ way) for each in shown)
         end, depth = end + further * way, depth + further
     left, _, right = np.linalg.svd(np.sum([each.orientation for each in shown], axis=0))
-    mean = left @ right  # of rotations
-    leant = max(float(norm(cross(each.orientation.T @ way, mean.T @ way))) for each in shown)
+    upright = left @ right  # mean of rotations
+    leant = max(float(norm(cross(each.orientation.T @ way, upright.T @ way))) for each in shown)
     return Seat(
         way=_vector(way), point=_vector(point), end=_vector(end), start=_vector(start),
-        orientation=_vector(rotation_vector(mean)), leant_rad=float(np.arcsin(min(leant, 1.0))),
+        orientation=_vector(rotation_vector(upright)), leant_rad=float(np.arcsin(min(leant, 1.0))),
         contact_m=depth, place=settings.place, shift_m=settings.shift, tilt_rad=settings.tilt,
-        height_m=settings.height, approach=settings.approach, stop_m=STOP_M if free else 0.0, tries=settings.tries,
+        height_m=settings.height, approach=settings.approach, stop_m=0.001 if free else 0.0, tries=settings.tries,
         settle_s=settings.settle,
     )  # fmt: skip
 
@@ -318,16 +322,6 @@ def _pressed_way(shown: Sequence[Shown]) -> Float | None:
         return None
     mean, came = unit(ways.mean(axis=0)), np.array([unit(s.end - s.start) for s in shown])
     return mean if min((ways @ mean).min(), (came @ mean).min()) > SLID else None
-
-
-def _goes_straight(shown: Sequence[Shown], way: Float) -> None:
-    """Raise `InputError` if the part was turned about its way in contact, as a bayonet is."""
-    turned = [rotation_vector(s.orientation @ s.part.pose.rotation[0].T) @ way for s in shown]
-    if (mean := abs(float(np.mean(turned)))) > SCREWED:
-        raise InputError(
-            "learn", f"the part was turned by {degrees(mean):.0f} degrees about its way, which a seating does not do",
-            "leave --skill seat out, and the push learns the turn; or --set round=true, if it is a round peg",
-        )  # fmt: skip
 
 
 def _vector(values: Float) -> tuple[float, float, float]:

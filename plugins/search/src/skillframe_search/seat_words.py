@@ -9,8 +9,6 @@ from skillframe_search.handling import HANDLING as HOW
 from skillframe_search.seat_document import PUSH, SEARCH, Seat, part_of, read_seat
 
 NAMES = ((PUSH, "push"), (SEARCH, "search"))
-LEANS_RAD = radians(2.0)
-"""Limit between the tilt of upright parts within their play and of parts left leaning."""
 NOWHERE = (
     "push: has no direction, since the contact showed none (below: why); only what the search lets fall in is seated; "
     "show it again, and push the part in rather than carry it"
@@ -25,7 +23,12 @@ def describe(document: Document) -> list[str]:
     lines = [f"seat a part {1e3 * seat.contact_m:.1f} mm deep: {'approach, ' * seat.approach}push ({kinds[0]}){stall}"]
     removal = bool(document.get("settings", {}).get("removal"))
     nowhere = goes_nowhere(document["phases"][PUSH])
-    return [*lines, *_parts(seat, nowhere), *_sources(seat, removal), *_phases(document)]
+    lines += [*_parts(seat, nowhere), *_sources(seat, removal)]
+    for index, name in NAMES:
+        sub = part_of(document, index)
+        kind = registry().skill(sub["type"])
+        lines += [f"{name}: {line}" for line in (kind.describe(sub) if kind.describe is not None else [kind.summary])]
+    return lines
 
 
 def goes_nowhere(push: Document) -> bool:
@@ -44,13 +47,21 @@ def _parts(seat: Seat, nowhere: bool) -> list[str]:
         f"search: where the push makes less than {1e3 * HOW.progress_m:g} mm in {HOW.stall_s:g} s or rests "
         f"short of the end; adds what the fixture is off beyond chamfer and clearance; {seat.tries} times at most"
     )
+    stop = (
+        f"stop: nothing stops the part at its end, so the push fades over the last {1e3 * seat.stop_m:g} mm; "
+        "adds that a part that nothing stops stands where it was shown"
+    )
+    settle = (
+        f"settle: where it rests near the end, {HOW.settle_nm:g} Nm go round for {seat.settle_s:g} s and fade, and up "
+        f"to {HOW.settle_n:g} N draw it to the nominal axis; adds that a loose part does not stay wedged aslant"
+    )
     return [
         *([approach] if seat.approach else []),
         NOWHERE if nowhere else "push: adds the direction, and is compliant where contact guides the part",
         *([search] if seat.tries else []),
         f"catch: brakes above {1e3 * HOW.catch_m_s:.3g} mm/s along the way with {HOW.catch_ns_m:g} Ns/m; adds that a "
         "part that lets go does not hit the bottom",
-        *([_stop(seat)] if seat.stop_m else []),
+        *([stop] if seat.stop_m else []),
         f"upright: pulls upright with {HOW.upright_nm_rad:g} Nm/rad until it searches or rests in the hole; adds that "
         "the part leans less where it goes straight in",
         "free: in the hole nothing of the push goes across the way; adds that a push that slants, or is compliant on "
@@ -61,7 +72,7 @@ def _parts(seat: Seat, nowhere: bool) -> list[str]:
         f"rock: turns {HOW.rock_nm:g} Nm round at {HOW.rock_hz:g} Hz where the part rests after a search, then "
         f"{HOW.slow_nm:g} Nm at {HOW.slow_hz:g} Hz, then its tip on a spiral of {1e3 * HOW.tip_pitch_m:g} mm pitch; "
         "adds that it does not jam",
-        *([_settle(seat)] if seat.settle_s and not seat.stop_m else []),
+        *([settle] if seat.settle_s and not seat.stop_m else []),
         f"centre: at the end, but more than {1e3 * HOW.aside_m:g} mm from the nominal axis, it is drawn back until "
         f"{HOW.centre_n:g} N hold it; adds that a part in a slot that is open at an end is where it was shown",
         f"lost: more than {1e3 * (HOW.lost_m + seat.height_m):.1f} mm past the end it has missed the "
@@ -69,51 +80,25 @@ def _parts(seat: Seat, nowhere: bool) -> list[str]:
     ]
 
 
-def _stop(seat: Seat) -> str:
-    return (
-        f"stop: nothing stops the part at its end, so the push fades over the last {1e3 * seat.stop_m:g} mm; "
-        "adds that a part that nothing stops stands where it was shown"
-    )
-
-
-def _settle(seat: Seat) -> str:
-    return (
-        f"settle: where it rests near the end, {HOW.settle_nm:g} Nm go round for {seat.settle_s:g} s and fade, and up "
-        f"to {HOW.settle_n:g} N draw it to the nominal axis; adds that a loose part does not stay wedged aslant"
-    )
-
-
 def _sources(seat: Seat, removal: bool) -> list[str]:
     x, y, z = seat.end
     where = (
         f"at ({x:.4f}, {y:.4f}, {z:.4f}) m in base" if seat.place == "base" else "as far from the run's start as then"
     )
+    leant = (
+        f"the part leant up to {degrees(seat.leant_rad):.1f} degrees from the mean of its demonstrated ends, which the "
+        "skill takes for upright: show it again, and let go once it stands as it should"
+    )
     return [
         f"from the demonstrations: {'the push; ' * (not removal)}the way ({', '.join(f'{v:.3f}' for v in seat.way)}); "
         f"the end {where}; the first contact {1e3 * seat.contact_m:.1f} mm above it",
-        *([_leant(seat)] if seat.leant_rad > LEANS_RAD else []),
+        *([leant] if seat.leant_rad > radians(2.0) else []),  # upright parts tilt less within their play
         f"from the user: the fixture may be off by {1e3 * seat.shift_m:g} mm across, {degrees(seat.tilt_rad):.3g} "
         f"degrees and {1e3 * seat.height_m:g} mm along the way (--set shift, tilt, height)",
         f"by hand (our choice): {'the push; ' * removal}the default search's force, stiffness, speed, pitch, passes "
         "and dither, all figures of catch, upright, rock, swing, settle, stall and lost; chosen by what they were "
         "worth on AutoMate's assemblies, not learned",
     ]
-
-
-def _leant(seat: Seat) -> str:
-    return (
-        f"the part leant up to {degrees(seat.leant_rad):.1f} degrees from the mean of its demonstrated ends, which the "
-        "skill takes for upright: show it again, and let go once it stands as it should"
-    )
-
-
-def _phases(document: Document) -> list[str]:
-    lines = []
-    for index, name in NAMES:
-        sub = part_of(document, index)
-        kind = registry().skill(sub["type"])
-        lines += [f"{name}: {line}" for line in (kind.describe(sub) if kind.describe is not None else [kind.summary])]
-    return lines
 
 
 def explain(document: Document) -> list[Illustration]:

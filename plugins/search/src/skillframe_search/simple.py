@@ -14,7 +14,7 @@ import numpy as np
 from skillframe.frames import Float, norm, unit
 
 FINE = 2e-4  # m between points
-FINER, SLOWER = 0.6, 0.8  # of pitch and speed, each further pass
+FINER = 0.6  # of the pitch, each further pass
 
 
 def spiral(dimensions: int, pitch: float, length: float, layers: Sequence[float] = (0.0,)) -> Float:
@@ -44,7 +44,7 @@ def there_and_back(
     # even, so that the wide ones begin in the middle
     for reach, count in ((inner, 2 if inner else 0), (radius, passes)):
         for k in range(count):
-            way = _outwards(pitch * FINER**k, reach, speed * SLOWER**k, acceleration, step)
+            way = _outwards(pitch * FINER**k, reach, speed * 0.8**k, acceleration, step)
             parts.append(way if k % 2 == 0 else way[::-1] @ _turned(way[-1], parts[-1][-1]))
     return np.concatenate(parts)
 

@@ -18,7 +18,6 @@ from skillframe.frames import Float, norm
 
 STEP_S = 0.02
 SLACK = 1.05
-SIDES = 4  # pairs of parallel sides: an octagon
 
 
 class Motion(NamedTuple):
@@ -106,11 +105,12 @@ def _normals(k: int) -> tuple[Float, Float]:
     """Bounded directions (m, k), and the share of the limit of each (m,)."""
     if k == 1:
         return np.ones((1, 1)), np.ones(1)
-    angle = np.arange(SIDES) * np.pi / SIDES
-    plane = np.zeros((SIDES, k))
+    sides = 4  # pairs of parallel sides: an octagon
+    angle = np.arange(sides) * np.pi / sides
+    plane = np.zeros((sides, k))
     plane[:, :2] = np.stack([np.cos(angle), np.sin(angle)], axis=1)
     others = np.eye(k)[2:]
-    inscribed = np.full(SIDES, np.cos(0.5 * np.pi / SIDES))
+    inscribed = np.full(sides, np.cos(0.5 * np.pi / sides))
     return np.concatenate([plane, others]), np.concatenate([inscribed, np.ones(k - 2)])
 
 

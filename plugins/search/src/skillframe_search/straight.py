@@ -10,10 +10,6 @@ import numpy as np
 from skillframe.extend import Document
 from skillframe.frames import Float
 
-PUSH_N, STIFF_N_M, SPEED_M_S = 12.0, 1500.0, 0.02
-"""Largest push, stiffness along it, speed."""
-ACROSS, ALONG = 40.0, 120.0  # damping [Ns/m]
-TURN_NM_RAD, TURN_DAMPING = 3.0, 0.3
 PLACES = ("center_of_compliance", "learned_at", "work_at")
 
 
@@ -25,16 +21,15 @@ def straight_push(tool: Mapping[str, Any], way: Float) -> Document:
     frames = {name: list(point) for name, point in tool.items()}
     along = np.outer(way, way)
     translation = {
-        "desired_direction": way.tolist(), "speed": SPEED_M_S, "fully_compliant": False,
-        "stiffness": (STIFF_N_M * along).tolist(), "compliant_axes": np.linalg.svd(along)[0][:, 1:].T.tolist(),
-        "damping": (ACROSS * np.eye(3) + (ALONG - ACROSS) * along).tolist(),
+        "desired_direction": way.tolist(), "speed": 0.02, "fully_compliant": False,  # m/s
+        "stiffness": (1500.0 * along).tolist(), "compliant_axes": np.linalg.svd(along)[0][:, 1:].T.tolist(),  # N/m
+        "damping": (40.0 * np.eye(3) + (120.0 - 40.0) * along).tolist(),  # Ns/m
     }  # fmt: skip
     rotation = {
         "desired_direction": None, "speed": 0.0, "fully_compliant": False, "compliant_axes": [],
-        "stiffness": (TURN_NM_RAD * np.eye(3)).tolist(), "damping": (TURN_DAMPING * np.eye(3)).tolist(),
+        "stiffness": (3.0 * np.eye(3)).tolist(), "damping": (0.3 * np.eye(3)).tolist(),  # Nm/rad, Nms/rad
     }  # fmt: skip
-    # Contact force that ends a run [N]
-    stop = {"lead_force_n": PUSH_N, "force_limit_n": 80.0, "time_limit_s": 60.0, "travel_limit_m": 0.3}
+    stop = {"lead_force_n": 12.0, "force_limit_n": 80.0, "time_limit_s": 60.0, "travel_limit_m": 0.3}
     phase = {
         "pitch": None, "stop": stop, "translation": {**translation, "evidence": {}},
         "rotation": {**rotation, "evidence": {}},

@@ -112,7 +112,12 @@ class Swing(Skill):
         over = np.where(self._stage == UPRIGHT, into > HOW.upright_s, over) & (self._stage < DOWN)
         for i in np.flatnonzero(over).tolist():
             if LIFTING < self._stage[i] < UPRIGHT:
-                self._note(i, int(self._stage[i]) - 1, observation.pose)
+                # note the orientation at a limit, and the axis once all are known
+                limit, turn = int(self._stage[i]) - 1, rotation_vector(observation.pose.rotation[i] @ self._upright.T)
+                self._turns[i, limit], self._at[i, limit] = turn, observation.pose.position[i]
+                if limit == LIMITS - 1:
+                    about = rotation_matrix((turn @ self._way) * self._way)
+                    self._found[i] = rotation_matrix(self._tilt()[i]) @ about @ self._upright
         self._stage += over
         self._began = np.where(over, observation.time, self._began)
         into, stage = observation.time - self._began, self._stage
@@ -134,14 +139,6 @@ class Swing(Skill):
         zero = np.zeros((len(into), 6))
         pose = Pose(place, self._found.copy())
         return Command(pose, zero, Impedance(stiffness), wrench, self._status.copy(), self._reason.copy())
-
-    def _note(self, row: int, limit: int, pose: Pose) -> None:
-        """Note the orientation at a limit, and the axis once all are known."""
-        turn = rotation_vector(pose.rotation[row] @ self._upright.T)
-        self._turns[row, limit], self._at[row, limit] = turn, pose.position[row]
-        if limit == LIMITS - 1:
-            about = rotation_matrix((turn @ self._way) * self._way)
-            self._found[row] = rotation_matrix(self._tilt()[row]) @ about @ self._upright
 
     def _tilt(self) -> Float:
         """(N, 3) rotation vectors of the axes."""

@@ -19,17 +19,15 @@ from skillframe_search.exploration import CUT, Exploration
 
 BALL = (1.0, 2.0, np.pi, 4.0 * np.pi / 3.0, 0.5 * np.pi**2, 8.0 * np.pi**2 / 15.0)  # volumes of unit balls
 SEEN_M = 0.0008  # nearer than this to the way so far is searched
-FINE_M = 0.0004  # between points of the way so far
-MOST_EXCHANGES = 400
 
 
-def tour(exploration: Exploration, length: float, rng: np.random.Generator, seen_m: float = SEEN_M) -> Float:
+def tour(exploration: Exploration, length: float, rng: np.random.Generator) -> Float:
     """(n, k) places in the order of the visit [m], from the start (zero), at least `length` metres long."""
     path, travelled = np.zeros((1, len(exploration.mean))), 0.0
     while travelled < length:
         wanted = min(0.06, length - travelled)  # length of a round's tour
         cut = reach(exploration, travelled + wanted)
-        added = _round(partial(_unseen, exploration, rng, finely(path), seen_m, cut), path[-1], wanted)
+        added = _round(partial(_unseen, exploration, rng, finely(path), cut), path[-1], wanted)
         travelled += _length(added, path[-1])
         path = np.concatenate([path, added])
     return path
@@ -43,19 +41,17 @@ def reach(exploration: Exploration, length: float) -> float:
     return float(np.clip((looked / volume) ** (1.0 / k), 1.0, CUT))
 
 
-def _unseen(
-    exploration: Exploration, rng: np.random.Generator, seen: Float, seen_m: float, cut: float, count: int
-) -> Float:
+def _unseen(exploration: Exploration, rng: np.random.Generator, seen: Float, cut: float, count: int) -> Float:
     """Samples away from the way so far, or any where most of it has been searched."""
     places = exploration.draw(rng, 4 * count, cut)
     apart = np.sqrt(((places[:, None] - seen[None]) ** 2).sum(axis=2).min(axis=1))
-    return np.concatenate([places[apart > seen_m], places[apart <= seen_m]])[:count]
+    return np.concatenate([places[apart > SEEN_M], places[apart <= SEEN_M]])[:count]
 
 
 def finely(path: Float) -> Float:
     """The way through places, a point every 0.4 mm."""
     travelled = np.concatenate([[0.0], np.cumsum(norm(np.diff(path, axis=0)))])
-    along = np.arange(0.0, travelled[-1] + FINE_M, FINE_M)
+    along = np.arange(0.0, travelled[-1] + 0.0004, 0.0004)  # m
     return np.stack([np.interp(along, travelled, column) for column in path.T], axis=1)
 
 
@@ -86,7 +82,7 @@ def nearest_first(places: Float, here: Float) -> Float:
 def shortened(path: Float, here: Float) -> Float:
     """The path after 2-opt."""
     path = np.vstack([here[None], path])
-    for _ in range(MOST_EXCHANGES):
+    for _ in range(400):  # exchanges at most
         apart = norm(path[:, None] - path[None])
         step = np.append(apart[np.arange(len(path) - 1), np.arange(1, len(path))], 0.0)
         # reversing piece i+1 .. j turns edges (i, i+1), (j, j+1) into (i, j), (i+1, j+1); the end is free

@@ -21,7 +21,6 @@ from skillframe.robot import RobotModel
 from skillframe.world import Scene
 
 FOUND_M = 0.0025
-NEAR_M, NEAR_RAD = 0.0015, 0.06  # a part set down this near falls in by itself
 NOBODY_KNEW = (0.0, 0.0, 0.0)
 
 
@@ -63,7 +62,8 @@ def goals(count: int, task: Task, seed: int = 100) -> Float:
     """(count, 3) goals against the start [m, m, rad]: samples of the belief, without those found at once."""
     normal = np.random.default_rng(seed).standard_normal((20 * count, 3))
     where = np.array(task.centre) + normal[np.abs(normal).max(axis=1) < CUT] * np.array(task.believed)
-    trivial = (np.hypot(where[:, 0], where[:, 1]) < NEAR_M) & (np.abs(where[:, 2]) < NEAR_RAD)
+    # a part set down this near falls in by itself [m, rad]
+    trivial = (np.hypot(where[:, 0], where[:, 1]) < 0.0015) & (np.abs(where[:, 2]) < 0.06)
     result: Float = where[~trivial][:count]
     return result
 

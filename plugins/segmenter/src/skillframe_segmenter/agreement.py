@@ -12,8 +12,6 @@ from typing import Any
 from skillframe.demonstration import Demonstration
 from skillframe.errors import InputError
 
-HALF_WAY = 0.75
-
 
 def check_agreement(rows: Sequence[Mapping[str, Any]], demonstrations: Sequence[Demonstration]) -> None:
     """Refuse demonstrations that do not belong together.
@@ -41,19 +39,14 @@ def check_agreement(rows: Sequence[Mapping[str, Any]], demonstrations: Sequence[
                 f"goes through its phases the other way round ({_told(mine)}) than the others ({_told(others[0])})",
                 "leave it out, or record it again",
             )  # fmt: skip
-        _check_end(names[i], rows[i], [row for j, row in enumerate(rows) if j != i])
-
-
-def _check_end(name: str, mine: Mapping[str, Any], others: Sequence[Mapping[str, Any]]) -> None:
-    last = mine["labels"][-1]
-    if any(row["labels"][-1] in mine["labels"] or last not in row["labels"] for row in others):
-        return
-    if _time_from(mine, last) < HALF_WAY * min(_time_from(row, last) for row in others):
-        raise InputError(
-            name, f"stops half-way: ends in phase {last + 1}, where the others go on to phase "
-            f"{others[0]['labels'][-1] + 1}",
-            "leave it out, or record it to the end",
-        )  # fmt: skip
+        last, rest = mine[-1], [row for j, row in enumerate(rows) if j != i]
+        if any(theirs[-1] in mine or last not in theirs for theirs in others):
+            continue
+        if _time_from(rows[i], last) < 0.75 * min(_time_from(row, last) for row in rest):
+            raise InputError(
+                name, f"stops half-way: ends in phase {last + 1}, where the others go on to phase {others[0][-1] + 1}",
+                "leave it out, or record it to the end",
+            )  # fmt: skip
 
 
 def _time_from(row: Mapping[str, Any], phase: int) -> float:

@@ -22,7 +22,6 @@ from skillframe.demonstration import Demonstration
 from skillframe.extend import Document, LearnOptions
 from skillframe.frames import unit
 
-CORRELATION_M = 0.015  # of a person's wandering: 30 mm/s for 0.5 s
 Learner = Callable[[Sequence[Demonstration], LearnOptions], Document]
 
 
@@ -54,7 +53,10 @@ def learned_in_air(learn: Learner, parts: Sequence[Demonstration], options: Lear
 
 
 def _short_in_air(body: Document) -> bool:
-    """Whether a learned phase moved without a push, mostly in the air, over less than `CORRELATION_M`."""
+    """Whether a learned phase moved without a push, mostly in the air, over less than a person's wandering correlates.
+
+    That is 15 mm: 30 mm/s for 0.5 s.
+    """
     part: dict[str, Any] = body["phases"][0].get("translation") or {}
     evidence = part.get("evidence")
     if evidence is None or part["desired_direction"] is not None or part["fully_compliant"] or evidence["held"]:
@@ -62,4 +64,4 @@ def _short_in_air(body: Document) -> bool:
     shown = evidence["demonstrations"]
     touching = np.concatenate([np.array(each["contact"], dtype=bool) for each in shown])
     path = float(np.mean([each["path"] for each in shown]))
-    return float(touching.mean()) < 0.5 and path < CORRELATION_M
+    return float(touching.mean()) < 0.5 and path < 0.015

@@ -19,7 +19,7 @@ from skillframe.frames import Pose, norm
 from skillframe_segmenter.boundaries import OPTION
 from skillframe_segmenter.visits import BASE, Visit, index_at, path_of, visits_of
 
-FASTEST, SLOWEST = 0.25, 0.02  # m/s, in free air
+SLOWEST = 0.02  # m/s, in free air
 NOWHERE = Pose(np.zeros(3), np.eye(3))
 LearnPlace = Callable[[Sequence[Demonstration], LearnOptions], Document]
 
@@ -62,7 +62,16 @@ def learn_places(
         "recoveries": recoveries,
         PLACES: as_plain({name: frames[0][name] for name in sorted(used)}),
         "phase_model": {"type": "places", "successors": np.eye(count, count + 1, 1).tolist()},
-        "demonstrations": [_row(d, each) for d, each in zip(demonstrations, visits, strict=True)],
+        "demonstrations": [
+            {
+                "file": d.source,
+                "start": float(d.time[0]),
+                "end": float(d.time[-1]),
+                "labels": list(range(count)),
+                "boundaries": [(v.out or (v.leaves,))[-1] for v in each[:-1]],
+            }  # where the tool leaves a place
+            for d, each in zip(demonstrations, visits, strict=True)
+        ],
     }
 
 
@@ -71,7 +80,7 @@ def _phase(
     scatter: dict[str, float],
 ) -> Document:  # fmt: skip
     pairs = list(zip(seen, visits, strict=True))
-    ways = [[_mean([_pose(d, t) for d, t in column]) for column in columns] for columns in (
+    ways = [[_mean(column) for column in columns] for columns in (
         [[(d, v.far) for d, v in pairs], [(d, v.near) for d, v in pairs]],
         [[(d, v.out[i]) for d, v in pairs if i < len(v.out)] for i in range(min(len(v.out) for v in visits))],
     )]  # fmt: skip
@@ -82,15 +91,12 @@ def _phase(
     }  # fmt: skip
 
 
-def _pose(demonstration: Demonstration, time: float) -> Pose:
-    i = index_at(demonstration, time)
-    return Pose(demonstration.position[i], demonstration.pose.rotation[i])
-
-
-def _mean(poses: Sequence[Pose]) -> Pose:
-    left, _, right = np.linalg.svd(np.mean([pose.rotation for pose in poses], axis=0))
+def _mean(moments: Sequence[tuple[Demonstration, float]]) -> Pose:
+    """Mean pose of the tool at times [s] of demonstrations."""
+    at = [(d, index_at(d, t)) for d, t in moments]
+    left, _, right = np.linalg.svd(np.mean([d.pose.rotation[i] for d, i in at], axis=0))
     rotation = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
-    return Pose(np.mean([pose.position for pose in poses], axis=0), rotation)
+    return Pose(np.mean([d.position[i] for d, i in at], axis=0), rotation)
 
 
 def _plain(poses: Sequence[Pose]) -> list[dict[str, list[float]]]:
@@ -107,12 +113,4 @@ def _speed(demonstrations: Sequence[Demonstration], visits: Sequence[Sequence[Vi
             if last > first:
                 length = float(norm(np.diff(path[first : last + 1], axis=0)).sum())
                 speeds.append(length / float(d.time[last] - d.time[first]))
-    return float(np.clip(np.median(speeds), SLOWEST, FASTEST)) if speeds else SLOWEST
-
-
-def _row(demonstration: Demonstration, visits: Sequence[Visit]) -> Document:
-    """A row of `demonstrations`, with boundaries where the tool leaves a place."""
-    return {
-        "file": demonstration.source, "start": float(demonstration.time[0]), "end": float(demonstration.time[-1]),
-        "boundaries": [(v.out or (v.leaves,))[-1] for v in visits[:-1]], "labels": list(range(len(visits))),
-    }  # fmt: skip
+    return float(np.clip(np.median(speeds), SLOWEST, 0.25)) if speeds else SLOWEST

@@ -13,7 +13,6 @@ from skillframe.extend import Document
 from skillframe_segmenter.settings import PHASE_MIN_S
 
 OPTION = "--set-boundary"
-ROUNDING_S = 1e-6
 
 
 class Move(NamedTuple):
@@ -69,27 +68,23 @@ def moved(rows: Sequence[Document], moves: Sequence[Move], names: Sequence[str])
         cuts[move.boundary] = move.time
         result[move.demonstration]["set"] = sorted({*result[move.demonstration].get("set", []), move.boundary})
     for move in moves:
-        _check_order(result[move.demonstration], move, names)
+        row = result[move.demonstration]
+        if any(b <= a for a, b in pairwise([row["start"], *row["boundaries"], row["end"]])):
+            raise InputError(
+                names[move.demonstration] or f"demonstration {move.demonstration + 1}",
+                f"boundary {move.boundary + 1} cannot be at {move.time:g} s: boundaries stay inside and in order",
+                f"it lasts from {row['start']:.2f} s to {row['end']:.2f} s; fix {OPTION}",
+            )
     for move in moves:
         _check_length(result[move.demonstration], move, names)
     return result
-
-
-def _check_order(row: Document, move: Move, names: Sequence[str]) -> None:
-    cuts: list[float] = row["boundaries"]
-    if any(b <= a for a, b in pairwise([row["start"], *cuts, row["end"]])):
-        raise InputError(
-            names[move.demonstration] or f"demonstration {move.demonstration + 1}",
-            f"boundary {move.boundary + 1} cannot be at {move.time:g} s: boundaries stay inside and in order",
-            f"it lasts from {row['start']:.2f} s to {row['end']:.2f} s; fix {OPTION}",
-        )
 
 
 def _check_length(row: Document, move: Move, names: Sequence[str]) -> None:
     edges = [row["start"], *row["boundaries"], row["end"]]
     before, here, after = edges[move.boundary : move.boundary + 3]
     shortest = min(here - before, after - here)
-    if shortest < PHASE_MIN_S - ROUNDING_S:
+    if shortest < PHASE_MIN_S - 1e-6:  # of rounding
         first, last = math.ceil(100.0 * (before + PHASE_MIN_S) - 1e-4), math.floor(100.0 * (after - PHASE_MIN_S) + 1e-4)
         raise InputError(
             names[move.demonstration] or f"demonstration {move.demonstration + 1}",

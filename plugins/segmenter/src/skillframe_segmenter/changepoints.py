@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from skillframe.frames import Float
 
-SHORTEST, MOST = 4, 400
+SHORTEST = 4
 Labels = NDArray[np.intp]
 
 
 def cuts(x: Float) -> list[int]:
     """Inner cuts of a signal (T, n), increasing."""
-    group = -(-len(x) // MOST)
+    group = -(-len(x) // 400)
     if group > 1:
         whole = len(x) // group
         return [group * c for c in cuts(x[: whole * group].reshape(whole, group, -1).mean(axis=1))]

@@ -7,30 +7,32 @@ are no better than chance (`explained`), and these are.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from skillframe.demonstration import Demonstration, contact_evidence
 from skillframe.errors import InputError
 from skillframe.extend import Document
 from skillframe_segmenter.agreement import check_agreement
 from skillframe_segmenter.explained import CERTAIN, MANY, explained
+from skillframe_segmenter.segmentation import refitted
 from skillframe_segmenter.settings import PHASE_MIN_S
 
-Held = Callable[[list[Document]], Document]
+Fit = Callable[[Sequence[Demonstration], int | None, Mapping[str, Any]], Document]
 
 
 def at_contact(
-    found: Document, demonstrations: Sequence[Demonstration], held: Held, at: str | None, axes: str
+    found: Document, demonstrations: Sequence[Demonstration], fit: Fit, cutting: Mapping[str, Any]
 ) -> Document:
     """The segmentation, or one cut at contact where the model explains nothing and contact does.
 
     Args:
         found: by the model.
         demonstrations: the same.
-        held: gives the two-phase segmentation for given rows.
-        at: observed point of the tool.
-        axes: "base" or "phase_start".
+        fit: of the segmenter.
+        cutting: its settings, with `at` and `axes`.
     """
+    at, axes = cutting["at"], cutting["axes"]
     told = explained(found["demonstrations"], demonstrations, at, axes)
     if told["p"] <= CERTAIN or told["touches"]["changes"] <= MANY * len(demonstrations):
         return found
@@ -39,7 +41,11 @@ def at_contact(
         return found
     try:
         check_agreement(rows, demonstrations)
-        return held(rows)
+        two = fit(demonstrations, 2, cutting)
+        if len(two["phase_model"]["phase_of"]) != 2:
+            return found
+        apart = {**two, "phase_model": {**two["phase_model"], "phase_of": [0, 1]}}
+        return refitted(apart, demonstrations, rows, set(range(len(rows))), 2, cutting)
     except InputError:  # too short for a window, or another order: contact is no better
         return found
 

@@ -27,7 +27,6 @@ from skillframe_segmenter.emission import DIMENSIONS, Observed, Phases
 from skillframe_segmenter.features import Features
 from skillframe_segmenter.settings import Settings
 
-MOST_ROUNDS, CLOSE, WRENCH_ROUNDS = 60, 1e-4, 3
 LEAK = 0.05
 NEVER = -1e3  # log density of a phase that the user excluded for a window
 Scalar = TypeVar("Scalar", bound=np.generic)
@@ -160,12 +159,12 @@ def converge(data: Data, posterior: Float, settings: Settings) -> Fit:
     constant = transitions.probabilities(weights, np.eye(data.regressors.shape[1])[-1])
     steps = _steps(data, np.broadcast_to(constant, (count, phases, phases)))
     log_likelihood, before = -np.inf, -np.inf
-    for _ in range(MOST_ROUNDS):
+    for _ in range(60):
         model, residual = _maximise(data, posterior, weights)
         expected = _expect(data, model, steps, residual)
         posterior = expected.smoothed.posterior[data.inside]
         before, log_likelihood = log_likelihood, float(expected.smoothed.log_likelihood.sum())
-        if abs(log_likelihood - before) < CLOSE * abs(log_likelihood):
+        if abs(log_likelihood - before) < 1e-4 * abs(log_likelihood):
             break
     return _fit(data, model, posterior, log_likelihood, expected)
 
@@ -180,7 +179,7 @@ def with_transitions(data: Data, fit: Fit, settings: Settings) -> Fit:
     inner = np.concatenate([np.arange(len(d)) > 0 for d in data.split(data.regressors)])
     steps = _steps(data, transitions.probabilities(model.weights, data.regressors))
     expected = fit.expected
-    for _ in range(WRENCH_ROUNDS):
+    for _ in range(3):
         joint = chain.pairs(*expected, steps)[entered]
         weights = transitions.improve(model.weights, prior, data.regressors[inner], joint)
         model, residual = _maximise(data, posterior, weights)
@@ -204,17 +203,13 @@ def _maximise(data: Data, posterior: Float, weights: Float) -> tuple[Model, Floa
     k = posterior.shape[1]
     firsts = posterior[np.concatenate([[0], np.cumsum(data.lengths)[:-1]])]
     initial = 0.5 / k + 0.5 * firsts.mean(axis=0)
-    phases, residual = _moving(data, posterior)
-    return Model(phases=phases, initial=initial, weights=weights, temper=data.temper), residual
-
-
-def _moving(data: Data, posterior: Float) -> tuple[Phases, Float]:
-    """Motion of the phases, where one that goes round does not share its covariance."""
     if data.going is None:
-        return emission.fitted(data.seen, posterior)
-    parts = [emission.fitted(data.seen, mine) for mine in (posterior[:, :-1], posterior[:, -1:])]
-    phases = Phases(*(np.concatenate(pair) for pair in zip(*(part for part, _ in parts), strict=True)))
-    return phases, np.concatenate([residual for _, residual in parts])
+        phases, residual = emission.fitted(data.seen, posterior)
+    else:  # what goes round does not share its covariance
+        parts = [emission.fitted(data.seen, mine) for mine in (posterior[:, :-1], posterior[:, -1:])]
+        phases = Phases(*(np.concatenate(pair) for pair in zip(*(part for part, _ in parts), strict=True)))
+        residual = np.concatenate([part for _, part in parts])
+    return Model(phases=phases, initial=initial, weights=weights, temper=data.temper), residual
 
 
 def _expect(data: Data, model: Model, steps: Float, residual: Float) -> Expected:

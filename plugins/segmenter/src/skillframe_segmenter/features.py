@@ -22,9 +22,6 @@ import numpy as np
 from skillframe.frames import Float, norm
 from skillframe_segmenter.windows import Windows
 
-SLOWEST = (1e-3, np.deg2rad(1.0))  # m/s, rad/s
-LEVER_M, ARM_M = 0.2, 0.01
-
 
 class Scales(NamedTuple):
     """Scales of soft normalisation: speed, turning speed, force and torque [m/s, rad/s, N, Nm]."""
@@ -73,7 +70,8 @@ def scales(demonstrations: Sequence[Windows]) -> list[Scales]:
     """Scales of each demonstration, force and torque those of all."""
     wrench = [w.wrench for w in demonstrations]
     force = max(0.2 * _percentile(wrench, slice(0, 3), 90), 1.5 * _noise(wrench, slice(0, 3)), 1e-9)
-    torque = max(0.2 * _percentile(wrench, slice(3, 6), 90), 1.5 * _noise(wrench, slice(3, 6)), force * ARM_M)
+    # the force at an arm of 10 mm at least
+    torque = max(0.2 * _percentile(wrench, slice(3, 6), 90), 1.5 * _noise(wrench, slice(3, 6)), force * 0.01)
     speeds = [typical_speeds(demonstrations, w) for w in demonstrations]
     return [Scales(0.25 * speed, 0.25 * turning, force, torque) for speed, turning in speeds]
 
@@ -81,8 +79,9 @@ def scales(demonstrations: Sequence[Windows]) -> list[Scales]:
 def typical_speeds(demonstrations: Sequence[Windows], one: Windows) -> tuple[float, float]:
     """V_r and w_r of one of the demonstrations [m/s, rad/s]."""
     typical = _percentile([w.motion for w in demonstrations], slice(0, 3), 80)
-    turning = max(_percentile([one.motion], slice(3, 6), 80), typical / LEVER_M, SLOWEST[1])
-    return max(_percentile([one.motion], slice(0, 3), 80), SLOWEST[0]), turning
+    # at least the typical speed at a lever of 0.2 m, 1 degree/s, and 1 mm/s
+    turning = max(_percentile([one.motion], slice(3, 6), 80), typical / 0.2, np.deg2rad(1.0))
+    return max(_percentile([one.motion], slice(0, 3), 80), 1e-3), turning
 
 
 def features(demonstration: Windows, scale: Scales) -> Features:

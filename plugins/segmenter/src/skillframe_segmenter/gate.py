@@ -23,8 +23,6 @@ from numpy.typing import NDArray
 from skillframe.frames import Float
 
 DIMENSIONS = 6
-FLOOR = 0.05**2
-UNSEEN = 1e-4
 
 
 class Chain(Protocol):
@@ -96,7 +94,7 @@ def fit(drive: Sequence[Float], posterior: Float, paths: Sequence[NDArray[np.int
     off = felt - mean[:, None]
     own = np.swapaxes(off * posterior.T[..., None], -1, -2) @ off / size[:, None, None]
     share = size / size.sum()
-    covariance = 0.5 * (own + np.einsum("k,kij->ij", share, own)) + FLOOR * np.eye(DIMENSIONS)
+    covariance = 0.5 * (own + np.einsum("k,kij->ij", share, own)) + 0.05**2 * np.eye(DIMENSIONS)
     return Gate(mean, covariance, share, counted(paths, len(size)))
 
 
@@ -111,7 +109,7 @@ def averaged(regressors: Float, memory: int) -> Float:
 
 def counted(paths: Sequence[NDArray[np.intp]], phases: int) -> Float:
     """(K, K) relative counts of transitions, all positive."""
-    counts = np.full((phases, phases), UNSEEN)
+    counts = np.full((phases, phases), 1e-4)  # of transitions that were never shown
     for path in paths:
         np.add.at(counts, (path[:-1], path[1:]), 1.0)
     result: Float = counts / counts.sum(axis=1, keepdims=True)

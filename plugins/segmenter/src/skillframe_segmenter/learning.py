@@ -9,7 +9,7 @@ way into a corner; in free air a push that leans on the friction cone explains t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby, pairwise
 from math import cos, inf, radians
@@ -24,21 +24,16 @@ from skillframe.frames import norm
 from skillframe_segmenter.agreement import check_agreement
 from skillframe_segmenter.air import Learner, learned_in_air
 from skillframe_segmenter.boards import learn_places, names_places
-from skillframe_segmenter.boundaries import Move, moved, parse_move
+from skillframe_segmenter.boundaries import moved, parse_move
 from skillframe_segmenter.contacts import at_contact
 from skillframe_segmenter.explained import explained
 from skillframe_segmenter.segmentation import refitted
 from skillframe_segmenter.settings import PHASE_MIN_S, PolicySettings, Settings
 from skillframe_segmenter.zvc import ZvcSettings
 
-SHORTEST_S = 0.25
 WRENCHES = "wrench_hmm"
 SAME_PUSH = cos(radians(35.0))
 OWN = ("segmenter", "skill", "phases", "recoveries", "set_boundary", "places")
-
-
-Fit = Callable[[Sequence[Demonstration], int | None, Mapping[str, Any]], Document]
-
 BETWEEN = ("recoveries", "set_boundary", "places")  # settings of the whole policy, not of a place
 
 
@@ -68,12 +63,14 @@ def learn(demonstrations: Sequence[Demonstration], options: LearnOptions) -> Doc
     if own["phases"] is None:
         found = _joined(found, demonstrations, own["skill"], options, stand_ins=True)
         if found["phase_model"].get("type") == WRENCHES and not moves:
-            found = at_contact(
-                found, demonstrations, lambda rows: _two(demonstrations, rows, segmenter.fit, cutting), options.at,
-                options.axes,
-            )  # fmt: skip
+            found = at_contact(found, demonstrations, segmenter.fit, cutting)
     if moves:
-        found = _held(found, demonstrations, moved(found["demonstrations"], moves, names), moves, own, cutting)
+        rows = moved(found["demonstrations"], moves, names)
+        if "phase_of" not in found["phase_model"]:  # no model of micro-phases to fit again
+            found = {**found, "demonstrations": list(rows)}
+        else:
+            found = refitted(found, demonstrations, rows, {m.demonstration for m in moves}, own["phases"], cutting)
+            check_agreement(found["demonstrations"], demonstrations)
     parts = [pieces(found, demonstrations, [k]) for k in range(_count(found))]
     bodies = [learned_in_air(_learner(own["skill"]), each, options) for each in parts]
     return {
@@ -111,29 +108,6 @@ def _sorted(options: LearnOptions) -> tuple[dict[str, Any], dict[str, Any], dict
     return own, {**cutting, "at": options.at, "axes": options.axes}, learning
 
 
-def _held(
-    found: Document, demonstrations: Sequence[Demonstration], rows: Sequence[Document], moves: Sequence[Move],
-    own: Mapping[str, Any], cutting: Mapping[str, Any],
-) -> Document:  # fmt: skip
-    """The segmentation with the user's boundaries, a model of micro-phases fitted again."""
-    if "phase_of" not in found["phase_model"]:
-        return {**found, "demonstrations": list(rows)}
-    again = refitted(found, demonstrations, rows, {m.demonstration for m in moves}, own["phases"], cutting)
-    check_agreement(again["demonstrations"], demonstrations)
-    return again
-
-
-def _two(
-    demonstrations: Sequence[Demonstration], rows: Sequence[Document], fit: Fit, cutting: Mapping[str, Any]
-) -> Document:  # fmt: skip
-    """A model of two phases, fitted with all demonstrations held to their rows."""
-    two = fit(demonstrations, 2, cutting)
-    if len(two["phase_model"]["phase_of"]) != 2:
-        raise InputError("contact", "is no two phases of the model", "name the number of phases")
-    apart = {**two, "phase_model": {**two["phase_model"], "phase_of": [0, 1]}}
-    return refitted(apart, demonstrations, rows, set(range(len(rows))), 2, cutting)
-
-
 def _count(found: Document) -> int:
     return len(found["phase_model"]["successors"])
 
@@ -152,7 +126,7 @@ def pieces(found: Document, demonstrations: Sequence[Demonstration], phases: Seq
                 joins = bool(spans) and spans[-1][1] == start
                 spans = [*spans[:-1], (spans[-1][0], stop)] if joins else [*spans, (start, stop)]
         result += [demonstration.between(*span) for span in spans]
-    long = [piece for piece in result if piece.duration >= SHORTEST_S]
+    long = [piece for piece in result if piece.duration >= 0.25]  # s
     return long or result
 
 

@@ -28,12 +28,7 @@ from numpy.typing import NDArray
 from skillframe.frames import Float, norm, unit
 from skillframe_segmenter.emission import Observed
 
-DIRECTIONS, FEWEST, MOST = 600, 4, 150
-WANDERING = 10.0  # windows
-MOVING, ALONG, BESIDE, STILL = 0.5, 0.38, 0.3, 0.5
-BEST_BAR, SLACK = 0.78, 0.05
-HELD = (5e-3, float(np.deg2rad(2.5)))  # m, rad
-TREMBLING = 1.0 / 3.0
+DIRECTIONS = 600
 
 
 @lru_cache(maxsize=2)
@@ -54,19 +49,19 @@ def _accepted(motion: Float, free: Float, angle: float, held: bool) -> Float:
     )
     size = np.einsum("wid,wid->wd", allowed, allowed)
     along = np.einsum("wid,wi->wd", allowed, unit(motion).astype(np.float32))
-    moving = (norm(motion)[:, None] > MOVING) & (not held)
-    beside = size - along * along < np.maximum(BESIDE, np.tan(angle) * along) ** 2
-    accepts = np.where(moving, (along > ALONG) & beside, size < STILL**2)
+    moving = (norm(motion)[:, None] > 0.5) & (not held)
+    beside = size - along * along < np.maximum(0.3, np.tan(angle) * along) ** 2
+    accepts = np.where(moving, (along > 0.38) & beside, size < 0.5**2)
     return np.append(accepts.mean(axis=0), float((~moving).mean()))
 
 
 def leaning(shares: Float, sizes: Float) -> Float:
-    """Shares (cells, 2, D + 1) of a phase, shrunk to their mean by `WANDERING` windows, with sizes (cells,)."""
+    """Shares (cells, 2, D + 1) of a phase, shrunk to their mean by 10 windows, with sizes (cells,)."""
     if len(sizes) < 2:
         return shares
     weight = sizes[:, None, None]
     mean = (weight * shares).sum(axis=0) / sizes.sum()
-    result: Float = (weight * shares + WANDERING * mean) / (weight + WANDERING)
+    result: Float = (weight * shares + 10.0 * mean) / (weight + 10.0)
     return result
 
 
@@ -94,15 +89,15 @@ def groups_of_one_motion(
         cells, sizes = [], []
         for each, offset in zip(labels, first[:-1], strict=True):
             mine = offset + np.flatnonzero(each == k)
-            if len(mine) < FEWEST:
+            if len(mine) < 4:  # windows
                 continue
             runs = np.split(mine, np.flatnonzero(np.diff(mine) > 1) + 1)
             parts = [(travelled[run] - travelled[run[0]]).reshape(-1, 2, 3) for run in runs]
             far = np.max([norm(part).max(axis=0) for part in parts], axis=0)
             path = np.sum([norm(np.diff(part, axis=0)).sum(axis=0) for part in parts], axis=0)
-            near, trembles = far < HELD, far < TREMBLING * path
+            near, trembles = far < (5e-3, float(np.deg2rad(2.5))), far < 1.0 / 3.0 * path
             held = np.array([near[0] and trembles[0], near[1] or trembles[1]])
-            some = mine[np.linspace(0, len(mine) - 1, min(len(mine), MOST)).astype(int)]
+            some = mine[np.linspace(0, len(mine) - 1, min(len(mine), 150)).astype(int)]
             u = seen.motion[some].reshape(-1, 2, 3)
             cells.append([_accepted(u[:, p], seen.free[some, p], angle, bool(held[p])) for p in range(2)])
             sizes.append(len(mine))
@@ -112,7 +107,7 @@ def groups_of_one_motion(
         alone = [_votes(g, shares) for g in groups]
         pairs = [(i, j) for i in range(len(groups)) for j in range(i)]
         score, (i, j) = max((_votes(groups[i] + groups[j], shares), (i, j)) for i, j in pairs)
-        if score < max(least, min(BEST_BAR, min(alone[i], alone[j]) - SLACK)):
+        if score < max(least, min(0.78, min(alone[i], alone[j]) - 0.05)):
             break
         groups[j] += groups.pop(i)
     return [next(g for g, members in enumerate(groups) if k in members) for k in range(phases)]

@@ -27,7 +27,7 @@ from skillframe_segmenter.rounds import rounds
 from skillframe_segmenter.settings import FEWEST_PER_PHASE, WINDOW_S, Settings
 from skillframe_segmenter.windows import Windows, cut_all
 
-SHORT, SHORT_JOINED = 3, (5, 8)  # windows; shorter runs go to a neighbour, before and after joining
+SHORT = 3  # windows; shorter runs go to a neighbour
 Labels = NDArray[np.intp]
 
 
@@ -84,7 +84,14 @@ def segment(
     chosen = build(Settings, settings, "--set")
     prepared = prepare(demonstrations, chosen, kind)
     data = em.gather(prepared.seen, prepared.drive, chosen, prepared.going)
-    _check_count(demonstrations, prepared.cut, phases)
+    shortest = min(range(len(prepared.cut)), key=lambda i: prepared.cut[i].size)
+    most = prepared.cut[shortest].size // FEWEST_PER_PHASE
+    if phases is not None and not 1 <= phases <= most:
+        raise InputError(
+            demonstrations[shortest].source or f"demonstration {shortest + 1}",
+            f"is {demonstrations[shortest].duration:.2f} s long, which allows 1 to {most} phases, not {phases}",
+            "give fewer --phases, or leave it out",
+        )
     found = fit(data, prepared, phases, chosen)
     rows = rows_of(prepared.cut, found.labels, [d.source for d in demonstrations])
     return {"phase_model": _model_of(prepared, found, chosen, kind), "demonstrations": rows}
@@ -159,19 +166,6 @@ def pose_regressors(position: Float, rotation: Float, origin: Pose0) -> Float:
     return np.concatenate([moved_by, turned_by, np.ones((*position.shape[:-1], 1))], axis=-1)
 
 
-def _check_count(demonstrations: Sequence[Demonstration], cut: Sequence[Windows], phases: int | None) -> None:
-    if phases is None:
-        return
-    shortest = min(range(len(cut)), key=lambda i: cut[i].size)
-    most = cut[shortest].size // FEWEST_PER_PHASE
-    if not 1 <= phases <= most:
-        raise InputError(
-            demonstrations[shortest].source or f"demonstration {shortest + 1}",
-            f"is {demonstrations[shortest].duration:.2f} s long, which allows 1 to {most} phases, not {phases}",
-            "give fewer --phases, or leave it out",
-        )
-
-
 def fit(data: em.Data, prepared: Prepared, phases: int | None, settings: Settings) -> Segmented:
     """Phases of prepared demonstrations, numbered by first appearance."""
     signals = [np.hstack([f.motion, 0.5 * f.contact]) for f in prepared.seen]
@@ -204,7 +198,7 @@ def _numbers(data: em.Data, settings: Settings) -> range:
 
 
 def _shortest(path: Labels) -> int:
-    return int(np.clip(round(0.05 * len(path)), *SHORT_JOINED))  # of the demonstration, within `SHORT_JOINED`
+    return int(np.clip(round(0.05 * len(path)), 5, 8))  # windows, of the demonstration
 
 
 def _numbered(found: Segmented) -> Segmented:
@@ -230,7 +224,13 @@ def _refit(
         else np.zeros((w.size, k))
         for i, w in enumerate(prepared.cut)
     ]
-    held = _said_to_go(data, prepared, found, rows, said)._replace(ruled=np.concatenate(ruled))
+    going = None
+    if data.going is not None and len(found.phase_of) > 1:
+        going = np.concatenate([
+            _labels_of(rows[i], w) == found.round if i in said else each
+            for i, (w, each) in enumerate(zip(prepared.cut, data.split(data.going), strict=True))
+        ])  # fmt: skip
+    held = data._replace(going=going, ruled=np.concatenate(ruled))
     start = em.converge(held, found.fit.posterior, settings)
     again = em.with_transitions(held, start, settings)
     paths = em.paths(held, again.model)
@@ -239,18 +239,6 @@ def _refit(
         for i, (w, path) in enumerate(zip(prepared.cut, paths, strict=True))
     ]
     return _numbered(found._replace(fit=again, paths=paths, labels=labels))
-
-
-def _said_to_go(
-    data: em.Data, prepared: Prepared, found: Segmented, rows: Sequence[Document], said: Set[int]
-) -> em.Data:  # fmt: skip
-    if data.going is None or len(found.phase_of) == 1:
-        return data._replace(going=None)
-    going = [
-        _labels_of(rows[i], w) == found.round if i in said else each
-        for i, (w, each) in enumerate(zip(prepared.cut, data.split(data.going), strict=True))
-    ]
-    return data._replace(going=np.concatenate(going))
 
 
 def _labels_of(row: Document, cut: Windows) -> Labels:

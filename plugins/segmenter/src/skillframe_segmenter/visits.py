@@ -27,7 +27,7 @@ from skillframe.errors import InputError
 from skillframe.frames import Float, Pose, norm, unit
 
 BASE = "base"
-FAR_M, NEAR_M, ALIKE_M, ALIKE = 0.04, 0.008, 0.001, 2.0
+FAR_M, NEAR_M = 0.04, 0.008
 TIP = "tip"
 
 
@@ -100,7 +100,7 @@ def belongs_to(
     """The place that points (D, 3) belong to: of those that explain them best, the nearest."""
     away = {name: float(norm(_seen(points, [each[name] for each in places])).mean()) for name in names}
     least = min(scatter.values(), default=0.0)
-    alike = [name for name in names if scatter.get(name, 0.0) <= max(ALIKE * least, least + ALIKE_M)]
+    alike = [name for name in names if scatter.get(name, 0.0) <= max(2.0 * least, least + 0.001)]
     return min(alike, key=lambda name: away[name]) if alike else BASE
 
 
@@ -173,24 +173,13 @@ def _visit(
     time, path = demonstration.time, path_of(demonstration)
     first, last = index_at(demonstration, start), index_at(demonstration, stop)
     before, after = (index_at(demonstration, t) for t in between)
-    away = norm(path - path[first])
-    far, near = (_last_beyond(away, before, first, limit) for limit in (FAR_M, NEAR_M))
-    gone = norm(path - path[last])
-    out = [index for limit in (NEAR_M, FAR_M) if (index := _first_beyond(gone, last, after, limit)) is not None]
+    away, gone = norm(path - path[first])[before : first + 1], norm(path - path[last])[last : after + 1]
+    far, near = (before + int(np.flatnonzero(away > limit).max(initial=0)) for limit in (FAR_M, NEAR_M))
+    out = [last + int(beyond[0]) for limit in (NEAR_M, FAR_M) if (beyond := np.flatnonzero(gone > limit)).size]
     leave = _turns_back(demonstration, path, first, last, out[0]) if out else after
     return Visit(
         place, float(time[far]), float(time[near]), start, float(time[leave]), tuple(float(time[i]) for i in out)
     )  # fmt: skip
-
-
-def _last_beyond(away: Float, begin: int, end: int, limit: float) -> int:
-    beyond = np.flatnonzero(away[begin : end + 1] > limit)
-    return begin + int(beyond[-1]) if beyond.size else begin
-
-
-def _first_beyond(away: Float, begin: int, end: int, limit: float) -> int | None:
-    beyond = np.flatnonzero(away[begin : end + 1] > limit)
-    return begin + int(beyond[0]) if beyond.size else None
 
 
 def _turns_back(demonstration: Demonstration, path: Float, first: int, last: int, out: int) -> int:

@@ -29,9 +29,6 @@ from skillframe.frames import (
 )
 from skillframe_segmenter.settings import WINDOW_S
 
-GRID_M = 1e-8
-FEWEST = 8  # windows
-
 
 class Windows(NamedTuple):
     """A demonstration in W windows.
@@ -72,7 +69,7 @@ def windows(demonstration: Demonstration, at: Float, axes: str) -> Windows:
         InputError: values that are not finite, or a recording too short to have phases.
     """
     where = demonstration.source or "demonstration"
-    relative = np.round((demonstration.position - demonstration.position[0]) / GRID_M) * GRID_M
+    relative = np.round((demonstration.position - demonstration.position[0]) / 1e-8) * 1e-8  # to 10 nm
     pose = Pose(relative, matrix_from_quaternion(demonstration.quaternion))
     point = pose.at(at)
     wrench = move_wrench(demonstration.wrench, rotate(pose.rotation, np.broadcast_to(at, point.position.shape)))
@@ -81,7 +78,7 @@ def windows(demonstration: Demonstration, at: Float, axes: str) -> Windows:
         raise InputError(where, "holds values that are not finite", "run skillframe check on it")
     elapsed = demonstration.time - demonstration.time[0]
     count = int(np.floor(elapsed[-1] / WINDOW_S + 1e-6))
-    if count < FEWEST:
+    if count < 8:
         raise InputError(
             where, f"is only {demonstration.duration:.2f} s long, too short to have phases", "record more of the motion"
         )

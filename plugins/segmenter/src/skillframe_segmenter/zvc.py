@@ -20,13 +20,13 @@ from skillframe.config import build
 from skillframe.demonstration import Demonstration
 from skillframe.errors import InputError
 from skillframe.extend import Document
-from skillframe.frames import Float, norm
+from skillframe.frames import norm
 from skillframe_segmenter import runs
 from skillframe_segmenter.features import typical_speeds
 from skillframe_segmenter.segmentation import rows_of, successors
 from skillframe_segmenter.windows import Windows, cut_all
 
-SMOOTHING, SHORTEST = 5, 3
+SHORTEST = 3  # windows
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -64,7 +64,11 @@ def fit(demonstrations: Sequence[Demonstration], phases: int | None, settings: M
 
 
 def _labels(cut: Windows, settings: ZvcSettings, phases: int | None) -> NDArray[np.intp]:
-    at = sorted({*_stops(cut, settings.still), *_crossings(cut, settings.force_n)})
+    at = _stops(cut, settings.still)
+    if settings.force_n > 0.0:
+        loud = (norm(cut.wrench[:, :3]) > settings.force_n).astype(np.intp)
+        at += [int(i) for i in runs.starts_of_runs(runs.without_short(loud, SHORTEST))[1:]]
+    at = sorted(set(at))
     if phases is not None:
         strength, width = dict[int, float](), 6  # change of the mean motion over six windows
         for i in at:
@@ -80,7 +84,8 @@ def _labels(cut: Windows, settings: ZvcSettings, phases: int | None) -> NDArray[
 
 def _stops(cut: Windows, share: float) -> list[int]:
     typical = typical_speeds([cut], cut)
-    speeds = [_smoothed(norm(cut.motion[:, part])) for part in (slice(0, 3), slice(3, 6))]
+    padded = [np.pad(norm(cut.motion[:, part]), 2, mode="edge") for part in (slice(0, 3), slice(3, 6))]
+    speeds = [np.convolve(each, np.ones(5) / 5, mode="valid") for each in padded]  # over five windows
     still = (speeds[0] < share * typical[0]) & (speeds[1] < share * typical[1])
     starts = runs.starts_of_runs(still.astype(np.intp))
     ends = np.append(starts[1:], cut.size)
@@ -88,16 +93,3 @@ def _stops(cut: Windows, share: float) -> list[int]:
         int(a + b) // 2 for a, b in zip(starts, ends, strict=True)
         if still[a] and b - a >= SHORTEST and a > 0 and b < cut.size
     ]  # fmt: skip
-
-
-def _crossings(cut: Windows, force: float) -> list[int]:
-    if force <= 0.0:
-        return []
-    touching = runs.without_short((norm(cut.wrench[:, :3]) > force).astype(np.intp), SHORTEST)
-    return [int(i) for i in runs.starts_of_runs(touching)[1:]]
-
-
-def _smoothed(values: Float) -> Float:
-    kernel = np.ones(SMOOTHING) / SMOOTHING
-    padded = np.pad(values, SMOOTHING // 2, mode="edge")
-    return np.convolve(padded, kernel, mode="valid")

@@ -33,10 +33,6 @@ WAITS = {"sync", "servoj", "stopj"}
 VERSION = (5, 12, 0, 0)
 PATIENCE_S = 3.0
 """In lockstep: longest real time to wait for a command."""
-PROTECTIVE_N = 150.0
-"""Contact force of a protective stop [N]."""
-FASTEST_RAD_S = 3.2
-"""Joint speed of a protective stop [rad/s]."""
 SERVO, MOVE_J, ZERO_FT, SERVO_STOP, WATCHDOG, PROTECTIVE, STOP = 11, 1, 8, 16, 35, 31, 255
 REALTIME = {24, SERVO, 9, 10, 6, 25, 26, 27, 38}
 """Commands that are done in every round while they stand in the register."""
@@ -44,7 +40,6 @@ ACCEPTED = {17, 29}
 """Commands that change nothing here: payload and tool centre point."""
 HOLD = {15, 33, 34}
 """Commands that hold the present position."""
-NORMAL_BIT, PROTECTIVE_BITS = 1, 4 | 1024
 
 
 class _Client:
@@ -234,22 +229,18 @@ class FakeUr(FakeController):
     def step(self) -> None:
         """Do a round of the program, and advance the arm."""
         if self._program and self._cycles is not None:
-            self._interpret(self._cycles)
+            try:
+                next(self._cycles)
+            except StopIteration:
+                self._halt("the program has ended")
+            except ScriptError as error:
+                self._halt(f"the program fails, {error}")
         elif self._program:
             self._round()
         for _ in range(round(PERIOD_S / self.arm.dt)):
             self.arm.step()
-        if not self.protective and self.arm.contact_n > PROTECTIVE_N:
+        if not self.protective and self.arm.contact_n > 150.0:  # the robot's own limit
             self.protect(f"{self.arm.contact_n:.0f} N at the tool")
-
-    def _interpret(self, cycles: Iterator[None]) -> None:
-        """One cycle of a program that is interpreted."""
-        try:
-            next(cycles)
-        except StopIteration:
-            self._halt("the program has ended")
-        except ScriptError as error:
-            self._halt(f"the program fails, {error}")
 
     def _popup(self, text: str, title: str = "Popup", **kind: bool) -> None:
         self.say(f"a window, {title}: {text}")
@@ -294,7 +285,7 @@ class FakeUr(FakeController):
         """Take joint positions (6,) for this period. Acceleration, speed, time, lookahead and gain change nothing."""
         target = joints[None].copy()
         fast = np.abs(target - self.arm.target).max() / PERIOD_S
-        if fast > FASTEST_RAD_S:
+        if fast > 3.2:
             self.protect(f"a joint is sent {fast:.1f} rad/s")
             return
         self.taken()
@@ -353,7 +344,7 @@ class FakeUr(FakeController):
             "actual_TCP_pose": self._pose(),
             "robot_mode": 7, "safety_mode": 3 if self.protective else 1, "runtime_state": 2 if self._program else 1,
             "robot_status_bits": 1 | (2 if self._program else 0), "joint_mode": [253] * 6,
-            "safety_status_bits": PROTECTIVE_BITS if self.protective else NORMAL_BIT,
+            "safety_status_bits": 4 | 1024 if self.protective else 1,
             "speed_scaling": 1.0, "target_speed_fraction": 1.0, "output_int_register_0": self._answer,
         }  # fmt: skip
 

@@ -13,9 +13,6 @@ from skillframe.frames import Float
 RATE_HZ = 500.0
 LOOKAHEAD_S, GAIN = 0.03, 300.0
 """servoJ's smoothing: part of the delay that robot.toml declares, so that a certificate holds for these values only."""
-WATCHDOG_HZ = 20.0
-"""The controller ends its program when it hears nothing for 1 / WATCHDOG_HZ seconds."""
-POLL_S = 5e-5
 STOPPED_BITS = ~0b11
 """Bits of `safety_status_bits` besides normal and reduced mode: protective, emergency and safeguard stops, faults."""
 STOP_RAD_S2 = 10.0
@@ -58,7 +55,7 @@ class UrLink:
             if time.perf_counter() > until:
                 self.fault = f"no state from the robot for {1e3 * SILENT_S:.0f} ms"
                 return self._seen
-            time.sleep(POLL_S)
+            time.sleep(5e-5)
         if self._last >= 0.0:
             self.missed += max(0, round((now - self._last) / self.period) - 1)
             self.longest = max(self.longest, now - self._last)
@@ -79,7 +76,7 @@ class UrLink:
     def arm(self) -> None:
         """Start the controller's watchdog."""
         if not self.fault:
-            self._control.setWatchdog(WATCHDOG_HZ)
+            self._control.setWatchdog(20.0)  # Hz: the controller ends its program when it hears nothing for 50 ms
         self.missed, self.longest = 0, 0.0
 
     def send(self, command: Float) -> None:

@@ -60,8 +60,6 @@ OTHER_ROBOT_M, OTHER_ROBOT_RAD = 5e-3, 0.02
 """Largest difference between the flange's pose and the controller's own: calibrated arms differ by millimetres."""
 TURNED_AWAY_RAD = 3.0
 """Largest difference of the tool's orientation from the desired one; a rotation vector is unique up to pi."""
-LINE = 116
-"""Characters in a line of comment."""
 TEMPLATE = Path(__file__).with_name("program.script")
 """The program, with `{{name}}` where a number or a statement of the skill or robot stands."""
 
@@ -115,7 +113,7 @@ def program(document: Document, robot: RobotSpec, lines: Sequence[str]) -> str:
         f"{phase.stop.force_limit_n:g} N, {phase.stop.time_limit_s * pace:.1f} s or {phase.stop.travel_limit_m:.3g} m",
         f"centre of compliance {_list(frame.center_of_compliance)} m in the flange's frame; units m, rad, N, Nm, s",
     ]
-    head = "".join(f"# {part}\n" for line in about for part in wrap(line, LINE))
+    head = "".join(f"# {part}\n" for line in about for part in wrap(line, 116))
     return head + _filled(TEMPLATE.read_text(encoding="utf-8"), values)
 
 

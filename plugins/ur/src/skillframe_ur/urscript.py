@@ -23,8 +23,6 @@ from skillframe_ur.script_values import MATHEMATICS, OPERATIONS
 TOKEN = re.compile(
     r'\s*(?:(?P<number>\d+\.\d+|\d+)|(?P<name>[A-Za-z_]\w*)|(?P<string>"[^"\\]*")|(?P<sign>[<>=!]=|[-+*/<>=(),:\[\]]))'
 )
-LONGEST = 10_000
-"""Rounds of loops between two cycles of the controller after which a program counts as endless."""
 LEVELS = ({"or"}, {"and"}, {"<", ">", "<=", ">=", "=="}, {"+", "-"}, {"*", "/"})
 """Binary operators, the weakest first."""
 WORDS = {
@@ -67,7 +65,7 @@ class Program:
 
     def _loop(self, condition: bool) -> bool:
         self._rounds += 1
-        if self._rounds > LONGEST:
+        if self._rounds > 10_000:
             raise TypeError("the loop takes no cycle of the controller, and would run for ever")
         return condition
 

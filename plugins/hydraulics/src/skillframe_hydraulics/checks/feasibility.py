@@ -23,7 +23,6 @@ from skillframe_hydraulics.checks.figures import areas as chamber_areas
 
 LEAST_ARM = 0.1  # m; below it, a piston force error of 1 kN has less than a third of its effect at mid stroke
 COVERED = 0.5  # share of a joint's range below which its cylinder's lengths are doubted; drawn ranges are often wide
-LARGEST_RATIO = 20.0  # of joint rates; an encoder's 0.1 mrad becomes 2 mrad, and bodies seem 400 times as heavy
 _NEEDED = ("bore", "rod", "stroke", "supply_pressure", "return_pressure")
 
 
@@ -80,7 +79,7 @@ def problems(chain: ClosedChain, z: Float) -> list[str]:
     ]
     turns = np.abs(state.embedding[chain.dependent]).max(axis=1, initial=0.0)
     for joint, turn in zip(chain.dependent, turns, strict=True):
-        if turn > LARGEST_RATIO:
+        if turn > 20.0:  # an encoder's 0.1 mrad becomes 2 mrad, and bodies seem 400 times as heavy
             name = chain.model.names[int(joint) + 1]
             far = f"it moves {turn:.3g} times as far as what moves it"
             found.append(f"the linkage of {name} is near its dead centre: {far}")

@@ -22,7 +22,6 @@ from skillframe_hydraulics.declared import noise_of
 
 CYLINDER = "hydraulic_cylinder"
 SHAPE = ("bore", "rod", "stroke")
-LARGEST = 1e15  # SI; squares and products still fit a double
 NEEDED = (
     *SHAPE, "dead_volume_a", "dead_volume_b", "bulk_modulus", "rated_flow", "rated_pressure_drop",
     "leakage", "coulomb_friction", "viscous_friction", "supply_pressure", "return_pressure",
@@ -206,7 +205,8 @@ def _impossible(actuation: Actuation, table: str) -> Iterator[Unfit]:
 def _broken(name: str, value: object) -> str:
     if name in SWITCHES:
         return "" if isinstance(value, int) and value in (0, 1) else "true or false"
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST:
+    # squares and products of figures up to 1e15 still fit a double
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= 1e15:
         return "a finite number"
     if name in POSITIVE and not value > 0.0:
         return "greater than zero"

@@ -17,8 +17,6 @@ from skillframe_hydraulics.supply import lines_of
 
 LEAST = 0.2
 """Of the swing's size: 20 mm to each side, four times what seals and encoders leave unknown."""
-SAMPLE_S = 0.02
-"""Between two looks at the swing [s]; its fastest part is a sine of 2 s."""
 
 
 def swing_flow(chain: ClosedChain, task: ToolTask, z: Float) -> Float:
@@ -26,7 +24,7 @@ def swing_flow(chain: ClosedChain, task: ToolTask, z: Float) -> Float:
     state, m = chain.at(z, np.zeros(len(z))), len(task.axes)
     back = np.linalg.inv(task.jacobian(state))
     rates = []
-    for time in np.arange(0.0, CALIBRATION_S, SAMPLE_S):
+    for time in np.arange(0.0, CALIBRATION_S, 0.02):  # the fastest part is a sine of 2 s
         _, velocity, _, joint_rate = swing(float(time), m)
         rates.append(np.concatenate([velocity, np.full(len(z) - m, joint_rate)]))
     speed = np.array(rates) @ (state.arms @ back).T

@@ -52,21 +52,19 @@ def banks(spec: RobotSpec, trials: int, ports: Sequence[str] = (), *, lines: Seq
     return kept((str(spec.folder), repr(specs), trials), lambda: open_cylinders(specs, trials, spec.folder))
 
 
-def open_cylinders(
-    specs: Sequence[ActuatorSpec], trials: int = 1, base: Path | None = None, version: int = 2
-) -> Actuators:
-    """A bank for these actuators. Arguments and errors as `skillframe.fmu.opening.open_actuators`.
+def open_cylinders(specs: Sequence[ActuatorSpec], trials: int = 1, base: Path | None = None) -> Actuators:
+    """A bank for these actuators, of FMI 2. Arguments and errors as `skillframe.fmu.opening.open_actuators`.
 
     Without a C compiler, a machine with only `hydraulic_cylinder` uses the Python reference, with a note.
     """
     folder = fmu_folders()[CYLINDER]
     named = all(spec.fmu == CYLINDER for spec in specs)
-    if named and find_compiler() is None and not cached_path(folder, version).is_file():
+    if named and find_compiler() is None and not cached_path(folder, 2).is_file():
         from skillframe.fmu import read_table
         from skillframe_hydraulics.cylinder.reference import ReferenceBank
 
         return ReferenceBank(specs, read_table(folder), trials)
-    return open_actuators(specs, trials, base, version)
+    return open_actuators(specs, trials, base, 2)
 
 
 def foreign_specs(spec: RobotSpec) -> list[ActuatorSpec]:

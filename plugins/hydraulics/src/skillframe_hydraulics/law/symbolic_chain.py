@@ -21,7 +21,6 @@ from skillframe.frames import Float
 from skillframe.robot import ClosedChain, ClosedLoop
 from skillframe_hydraulics.law.generated import dense_function
 
-ROUNDING = 1e-14
 Expression = Any  # casadi.SX
 
 
@@ -54,7 +53,7 @@ class BodyMotion(NamedTuple):
 
 def constant(array: Float) -> Expression:
     """A sparse casadi constant."""
-    return ca.sparsify(ca.SX(np.where(np.abs(array) < ROUNDING, 0.0, array)))
+    return ca.sparsify(ca.SX(np.where(np.abs(array) < 1e-14, 0.0, array)))  # rounding
 
 
 def placement_of(pose: pin.SE3) -> Placement:
@@ -131,14 +130,12 @@ class SymbolicChain:
         return Twist(constant(s[:3]), constant(s[3:]))
 
     def _step(self, j: int) -> Placement:
-        return placement_of(self.model.jointPlacements[j]).then(self._moved(j, self.q[self.model.joints[j].idx_q]))
-
-    def _moved(self, j: int, q: Expression) -> Placement:
-        axis = self._axes[j]
+        axis, q = self._axes[j], self.q[self.model.joints[j].idx_q]
+        moved = Placement(ca.SX.eye(3), axis.linear * q)
         if axis.angular.nnz():
             k = ca.skew(axis.angular)
-            return Placement(ca.SX.eye(3) + ca.sin(q) * k + (1 - ca.cos(q)) * (k @ k), ca.SX(3, 1))
-        return Placement(ca.SX.eye(3), axis.linear * q)
+            moved = Placement(ca.SX.eye(3) + ca.sin(q) * k + (1 - ca.cos(q)) * (k @ k), ca.SX(3, 1))
+        return placement_of(self.model.jointPlacements[j]).then(moved)
 
     def _up(self, ancestor: int, j: int) -> Placement:
         path = []

@@ -26,9 +26,9 @@ CORNERS = np.array([[2.5, 0.0, 1.0], [3.0, 0.0, 1.5], [3.5, 0.0, 1.0], [3.0, 0.0
 """The published diamond, in base [m], 5 s a leg."""
 LEG_S = 5.0
 ABOVE, PLATE, RADIUS = 0.95, 0.45, 0.05  # tool start, plate top, radius of the tool's sphere [m]
-NEAR, NEAR_S, LANDING_S, SLIDING_S = 0.02, 2.5, 3.0, 6.0
-"""The path stops this far above the plate [m], presses from rest, then slides [s], as a landing at speed exceeds the
-force limit."""
+NEAR, NEAR_S, SLIDING_S = 0.02, 2.5, 6.0
+"""The path stops this far above the plate [m], presses from rest for 3 s, then slides [s], as a landing at speed
+exceeds the force limit."""
 STROKE, SPEED = 0.4, 0.19  # along the plate [m], [m/s]
 
 
@@ -87,7 +87,7 @@ def press_and_slide(depth: float) -> Path:
     def place(time: float) -> Float:
         since = max(0.0, time - SLIDING_S)
         turn = SPEED / STROKE * (0.5 * since**2 if since < 1.0 else since - 0.5)
-        down = -above * blend(time / NEAR_S)[0] - (NEAR + depth) * blend((time - NEAR_S) / LANDING_S)[0]
+        down = -above * blend(time / NEAR_S)[0] - (NEAR + depth) * blend((time - NEAR_S) / 3.0)[0]
         return np.array([STROKE * np.sin(turn), 0.0, down])
 
     def path(time: float) -> tuple[Float, Float]:

@@ -28,8 +28,6 @@ from skillframe.world import nominal_fixture
 
 ROBOT, WORLD = "hiab_xs031", "pallets"
 SURFACES = ("wood", "styrofoam")
-NEAR = {"above": 0.25, "away": 0.3}
-"""Start of demonstrations, half-way to that of runs."""
 STARTS = ((-0.2, -0.15), (0.2, 0.15), (0.0, 0.0))
 """Start of a run from the nominal one: over the stack, beside the stop, in the middle [m]."""
 FRICTION, MASS = 0.2, 0.02
@@ -110,7 +108,8 @@ def _machine(rng: np.random.Generator) -> dict[str, float]:
 def _teach(job: RowRun, pair: int, surface: str) -> Taught:
     """Two demonstrations, onto the stack and against the stop, and their LMC."""
     kind, robot = registry().skill("lmc"), load_robot_model(ROBOT)
-    world = load_world(WORLD, {**NEAR, "surface": surface, "friction": job.settings["world.friction"]})
+    near = {"above": 0.25, "away": 0.3}  # half-way to the start of runs
+    world = load_world(WORLD, {**near, "surface": surface, "friction": job.settings["world.friction"]})
     scene = aimed(robot, world, radians(float(job.settings["operator.angle_deg"])))
     settings = OperatorSettings(delay_s=float(job.settings["operator.delay_s"]))
     seed, machine = 1000 * job.seed + pair, _machine(np.random.default_rng([job.seed, pair]))

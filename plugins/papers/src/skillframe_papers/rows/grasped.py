@@ -16,7 +16,7 @@ from skillframe_papers.rows.sweep import COARSE, HEIGHTS_M, SECONDS, both, phase
 
 NAMES, QUICK_NAMES = ("A", "B", "C", "D", "E"), ("B", "E")
 QUICK_DEG = COARSE[::2]
-QUICK_SECONDS, OWN_M = 7.5, HEIGHTS_M[1]
+OWN_M = HEIGHTS_M[1]
 
 
 class Grasped(NamedTuple):
@@ -46,7 +46,7 @@ def _computed(settings: tuple[tuple[str, float], ...], seed: int, quick: bool) -
     asked = [Asked(phase_of(name, scene.tool.frames, values), tilts, [stiff]) for name in names]
     rows = {
         height: dict(zip(names, side_by_side(
-            raised(robot, height), scene, asked, seed=seed, duration_s=QUICK_SECONDS if quick else SECONDS,
+            raised(robot, height), scene, asked, seed=seed, duration_s=7.5 if quick else SECONDS,
             tilted=in_the_grasp,
         ), strict=True))
         for height in ((OWN_M,) if quick else HEIGHTS_M)

@@ -86,10 +86,10 @@ CENTRED = "a centred spiral that nobody taught"
 NO_FORCES = "the same search, a constant push"
 
 
-def shown_by(job: RowRun, task: Task, count: int = 5) -> tuple[Demonstration, ...]:
-    """`count` demonstrations of a task, in a quick run three of 4 s."""
+def shown_by(job: RowRun, task: Task) -> tuple[Demonstration, ...]:
+    """Five demonstrations of a task, in a quick run three of 4 s."""
     seed = 1 + job.seed
-    return demonstrations(task, 3, seed, 4.0) if job.quick else demonstrations(task, count, seed)
+    return demonstrations(task, 3, seed, 4.0) if job.quick else demonstrations(task, 5, seed)
 
 
 def budget_of(job: RowRun) -> float:
@@ -174,14 +174,10 @@ def _hits(tried: Tried, time: float) -> Ran:
 HEAD = ("goal", "method", *(f"at {b:g} s" for b in BUDGETS), "found in the end")
 
 
-def _goals(job: RowRun, method: Method) -> int:
-    """Goals of a method in row 13."""
-    first = method in (WALK, ERGODIC)
-    return job.count(FIRST_GOALS if first else GOALS, QUICK_GOALS)
-
-
 def _asked(job: RowRun, task: str, methods: Iterable[Method]) -> list[Asked]:
-    return [Asked(task, each, _goals(job, each)) for each in methods]
+    """Methods with their goals in row 13."""
+    most = {WALK: FIRST_GOALS, ERGODIC: FIRST_GOALS}
+    return [Asked(task, each, job.count(most.get(each, GOALS), QUICK_GOALS)) for each in methods]
 
 
 def _all_quick(job: RowRun) -> list[Asked]:

@@ -18,14 +18,10 @@ from skillframe_papers.rows.insertion import POSTURES, Asked, Row, insert, large
 NAMES = ("A", "B", "C", "D", "E", "E*")
 QUICK_NAMES = NAMES[1:5]
 """A has other centres of compliance and takes its own simulation."""
-COARSE, BETWEEN = (4.0, 8.0, 12.0), (6.0, 10.0, 14.0)
-"""Tilts of everything [degrees], and those that a full run adds upright with joint friction."""
-BEYOND = (16.0, 20.0, 24.0)
-"""Further tilts without joint friction, beyond the sweep's end [degrees]."""
+COARSE = (4.0, 8.0, 12.0)
+"""Tilts of everything [degrees]."""
 HEIGHTS_M = (0.70, 0.75, 0.80)
 """Of the fixture over the floor; the middle one is the robot's."""
-PARTS = (0.05, 0.4)
-"""Friction of the parts, beside the world's."""
 PARTS_DEG = (8.0, 12.0)
 SECONDS, QUICK_SECONDS = 12.0, 7.5
 
@@ -103,8 +99,8 @@ def _computed(settings: tuple[tuple[str, float], ...], seed: int, quick: bool) -
         asked |= {(n, "coarse"): (coarse, [stiff]) for n in names}
         asked |= {(n, "free"): (both(COARSE[1:2]), [0.0]) for n in names}
     if not quick:
-        asked |= {(n, "between"): (both(BETWEEN), [stiff]) for n in names}
-        asked |= {(n, "beyond"): (both(BEYOND), [0.0]) for n in names}
+        asked |= {(n, "between"): (both((6.0, 10.0, 14.0)), [stiff]) for n in names}  # degrees, upright
+        asked |= {(n, "beyond"): (both((16.0, 20.0, 24.0)), [0.0]) for n in names}  # degrees, beyond the sweep's end
     done = run(asked)
     rows = {
         (n, POSTURES[0]): done.get((n, "free"), []) + done[n, "coarse"] + done.get((n, "between"), [])
@@ -117,7 +113,8 @@ def _computed(settings: tuple[tuple[str, float], ...], seed: int, quick: bool) -
     bottom: dict[str, list[Row]] = {}
     if not quick:
         beyond = {n: done[n, "beyond"] for n in names}
-        parts |= {(n, f): found for f in PARTS for n, found in run.each(names, small, stiff, parts=f).items()}
+        # friction of the parts, beside the world's
+        parts |= {(n, f): found for f in (0.05, 0.4) for n, found in run.each(names, small, stiff, parts=f).items()}
         mirrored = run.each(names, coarse, stiff, posture=POSTURES[1])
         rows |= {(n, POSTURES[1]): found for n, found in mirrored.items()}
         heights |= {

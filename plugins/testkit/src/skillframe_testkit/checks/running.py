@@ -28,8 +28,6 @@ HEIGHT = 0.3  # m in base
 TRIALS, TICKS, DT = 4, 2000, 1e-3
 WINDOW, FASTEST = 10, (3.0, 10.0)
 """m/s, rad/s over 10 ms: twice those of a human-sized arm; smaller jumps than 30 mm do not count."""
-STRONGEST = (200.0, 50.0)
-"""N, Nm of feed-forward: 2.5 times the 80 N limit of the shipped robots."""
 END_DT, END_TICKS = 0.05, 2400
 """120 s, longer than usual time limits."""
 NEVER = "never ends"
@@ -109,9 +107,9 @@ def stepped(skill: Skill, observation: Observation, tick: int) -> Command:
         ) from error
 
 
-def lead_of(skill: SkillType, document: Document, trials: int = TRIALS) -> tuple[int, ...]:
+def lead_of(skill: SkillType, document: Document) -> tuple[int, ...]:
     """(N,), or (N, arms) for a coordinator."""
-    return trials, *arms_of(skill, document)
+    return TRIALS, *arms_of(skill, document)
 
 
 class Standing(Skill):
@@ -196,7 +194,8 @@ class _Bounds:
             return True
         for fault in self._check.faults(command, tick):
             self.problems.setdefault("fault", f"{fault.cause} ({when})")
-        for part, bound, unit in zip((slice(0, 3), slice(3, 6)), STRONGEST, ("N", "Nm"), strict=True):
+        # of feed-forward 2.5 times the 80 N limit of the shipped robots is taken
+        for part, bound, unit in zip((slice(0, 3), slice(3, 6)), (200.0, 50.0), ("N", "Nm"), strict=True):
             most = norm(command.feedforward[running][..., part]).max(initial=0.0)
             if most > bound:
                 text = f"the feed-forward is {most:.3g} {unit} {when}; bound it, no more than {bound:g} {unit} is taken"

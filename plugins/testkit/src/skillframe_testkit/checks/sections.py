@@ -87,7 +87,10 @@ def _part(part: object) -> Iterator[str]:
         yield problem
     elif isinstance(part, Illustration):
         yield from _plain(part.title, part.caption)
-        yield from _drawing(part)
+        if ElementTree.fromstring(part.svg).tag.rpartition("}")[2] != "svg":
+            yield f"the drawing {part.title!r} is not SVG"
+        if found := ACTS.search(part.svg):
+            yield f"the drawing {part.title!r} holds {found[0].strip()!r}; nothing in it acts or is loaded on the page"
     elif isinstance(part, Grid):
         yield from _plain(*part.head, *(cell for row in part.rows for cell in row), part.caption)
     else:
@@ -99,14 +102,6 @@ def _plain(*texts: object) -> Iterator[str]:
         if isinstance(text, str) and (found := MARKUP.search(text)):
             yield f"holds markup, {found[0]!r:.40}; it is shown as typed, so write plain text"
             return
-
-
-def _drawing(picture: Illustration) -> Iterator[str]:
-    root = ElementTree.fromstring(picture.svg)
-    if root.tag.rpartition("}")[2] != "svg":
-        yield f"the drawing {picture.title!r} is not SVG"
-    if found := ACTS.search(picture.svg):
-        yield f"the drawing {picture.title!r} holds {found[0].strip()!r}; nothing in it acts or is loaded on the page"
 
 
 def _repeats(
