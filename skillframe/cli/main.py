@@ -153,7 +153,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def run(arguments: Sequence[str], debug: bool = False) -> int:
     """Run a command line and return its exit code. Messages go to stderr. -q may stand anywhere."""
-    _print_anything()
+    for stream in (sys.stdout, sys.stderr):  # print anything, whatever the terminal's encoding
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     quiet = [word for word in arguments if word in ("-q", "--quiet")]
     arguments = [*quiet[:1], *(word for word in arguments if word not in quiet)]
     try:
@@ -179,7 +181,11 @@ def run(arguments: Sequence[str], debug: bool = False) -> int:
         click.echo(f"error: {_of_the_system(error)}", err=True)
         return 2
     except Exception as error:
-        return _internal(error, debug)
+        if debug:
+            raise
+        text = f"{type(error).__name__}: {error} (run again with --debug for the traceback)"
+        click.echo(f"internal error: {text}", err=True)
+        return 3
     return result if isinstance(result, int) else 0
 
 
@@ -189,12 +195,6 @@ def _of_usage(error: click.ClickException, arguments: Sequence[str]) -> str:
     typed = next((word for word in arguments[:2] if word in COMMANDS), "")
     command = f"skillframe {typed}".strip() if context is None else context.command_path
     return f"{said[:1].lower()}{said[1:]} (help: {command} --help)"
-
-
-def _print_anything() -> None:
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
 
 
 def _of_the_system(error: OSError | MemoryError) -> str:
@@ -223,13 +223,6 @@ def _discard_output() -> None:
         sys.stdout.flush()
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def _internal(error: Exception, debug: bool) -> int:
-    if debug:
-        raise error
-    click.echo(f"internal error: {type(error).__name__}: {error} (run again with --debug for the traceback)", err=True)
-    return 3
 
 
 if __name__ == "__main__":

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 FORCES = ("peak_force_filtered_n", "peak_force_10ms_n", "ended_by", "goal_reached", "ended_itself")
 APART = "distance_to_collision_m"
-QUIET_S = 5.0  # shorter runs need no progress
 
 
 class RunCommand(click.Command):
@@ -36,7 +35,12 @@ class RunCommand(click.Command):
         try:
             return super().parse_args(ctx, args)
         except click.NoSuchOption as error:
-            _refuse_output(error.option_name.lstrip("-"))
+            from skillframe.extend.homes import homes
+            from skillframe.extend.registry import registry
+
+            name = error.option_name.lstrip("-")
+            if f"output:{name}" in homes():
+                registry().output(name)
             raise
 
 
@@ -49,14 +53,6 @@ def _outputs() -> list[OutputType]:
 def _option(record: OutputType) -> click.Option:
     kind = OutputFile(*record.endings) if record.endings else click.Path(path_type=Path)
     return click.Option([f"--{record.name}"], type=kind, help=f"{record.summary}.")
-
-
-def _refuse_output(name: str) -> None:
-    from skillframe.extend.homes import homes
-    from skillframe.extend.registry import registry
-
-    if f"output:{name}" in homes():
-        registry().output(name)
 
 
 @click.command(name="run", cls=RunCommand)
@@ -123,7 +119,7 @@ def command(
         path = files[record.name]
         if path is not None and record.check is not None:
             record.check(path)
-    with progress("s simulated", QUIET_S) as show, warned():
+    with progress("s simulated", after_s=5.0) as show, warned():
         done = once(
             skill, world, robot, coc=coc, set=dict(parse_setting(text) for text in settings), seed=seed,
             duration_s=duration, rate_hz=rate, scores=scores,

@@ -10,7 +10,6 @@ from collections.abc import Iterable, Iterator
 
 import click
 
-WIDTH = 100
 PHASE = re.compile(r"(phase \d+): ")
 LABEL = re.compile(r"[a-z][a-z ]{0,15}: ")
 OUTSIDE = re.compile(r"; (?![^(]*\))")
@@ -36,7 +35,7 @@ def laid_out(lines: Iterable[str]) -> Iterator[str]:
 def _broken(line: str, margin: str) -> Iterator[str]:
     label = LABEL.match(line)
     phrases = OUTSIDE.split(line)
-    if label is None or len(phrases) == 1 or len(margin + line) <= WIDTH:
+    if label is None or len(phrases) == 1 or len(margin + line) <= 100:  # columns
         yield margin + line
         return
     first, *rest = phrases
