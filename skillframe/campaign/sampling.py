@@ -110,7 +110,7 @@ def parse_axis(value: Any, where: str) -> Axis:
         raise InputError(where, f"expected a list of values, got {content!r}")
     if not content:
         raise InputError(where, "is empty", "give at least one value")
-    values = tuple(_listed_value(v, f"{where}[{i}]") for i, v in enumerate(content))
+    values = tuple(v if isinstance(v, bool | str | int) else _number(v, f"{where}[{i}]") for i, v in enumerate(content))
     if kind == "grid" and len(set(values)) != len(values):
         raise InputError(where, f"holds a value twice: {content!r}", "give every value of a grid once")
     return Axis(kind=kind, numbers=values)
@@ -121,14 +121,6 @@ def _number(value: Any, where: str) -> float:
     if not math.isfinite(number):
         raise InputError(where, f"is {number}", "give a finite number")
     return number
-
-
-def _listed_value(value: Any, where: str) -> Value:
-    if isinstance(value, bool | str):
-        return value
-    if isinstance(value, int):
-        return value
-    return _number(value, where)
 
 
 Draws = dict[str, NDArray[Any]]
@@ -182,21 +174,19 @@ def draws(spec: Design, trials: Sequence[int]) -> Draws:
         numbers = spec.vary[name].numbers
         result[name] = _column([numbers[trial // stride % len(numbers)] for trial in trials])
         stride *= len(numbers)
-    placed = {**result, **_sobol(spec, trials)}
-    return {name: placed[name] if name in placed else _independent(spec, name, trials) for name in spec.vary}
+    result |= _sobol(spec, trials)
+    for name, axis in spec.vary.items():
+        if axis.kind == "values":
+            result[name] = _column([axis.numbers[trial] for trial in trials])
+        elif name not in result:
+            rngs = (np.random.default_rng(seed_sequence(spec.seed, trial, name)) for trial in trials)
+            result[name] = _column([axis.draw(rng) for rng in rngs])
+    return {name: result[name] for name in spec.vary}
 
 
 def _column(values: list[Value]) -> NDArray[Any]:
     alike = len({type(value) for value in values}) <= 1
     return np.array(values) if alike else np.array(values, dtype=object)
-
-
-def _independent(spec: Design, name: str, trials: Sequence[int]) -> NDArray[Any]:
-    axis = spec.vary[name]
-    if axis.kind == "values":
-        return _column([axis.numbers[trial] for trial in trials])
-    rngs = (np.random.default_rng(seed_sequence(spec.seed, trial, name)) for trial in trials)
-    return _column([axis.draw(rng) for rng in rngs])
 
 
 def _sobol(spec: Design, trials: Sequence[int]) -> Draws:

@@ -92,9 +92,11 @@ def build(cls: type[_T], values: Mapping[str, Any], where: str) -> _T:
     for key in values:
         if key not in fields:
             raise InputError(where, str(UnknownName("key", str(key), fields)))
-    ready = {
-        key: _value(value, hints[key], said.get(key, ""), f"{where}.{key}") for key, value in values.items()
-    }  # fmt: skip
+    ready = {}
+    for key, value in values.items():
+        about, place = said.get(key, ""), f"{where}.{key}"
+        ready[key] = coerce(in_si(value, hints[key], unit_of(about), place), hints[key], place)
+        require_within(value, ready[key], unit_of(about), range_of(about), place)
     missing = [
         n
         for n, f in fields.items()
@@ -108,12 +110,6 @@ def build(cls: type[_T], values: Mapping[str, Any], where: str) -> _T:
 @lru_cache(maxsize=256)
 def _hints(cls: type) -> Mapping[str, Any]:
     return typing.get_type_hints(cls)
-
-
-def _value(value: Any, hint: Any, about: str, where: str) -> Any:
-    ready = coerce(in_si(value, hint, unit_of(about), where), hint, where)
-    require_within(value, ready, unit_of(about), range_of(about), where)
-    return ready
 
 
 def in_si(value: Any, hint: Any, unit: str, where: str) -> Any:
