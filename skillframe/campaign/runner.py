@@ -234,7 +234,8 @@ class _Session:
 
     def _driver(self, pool: Pool[ChunkJob], keep: Callable[[list[Row]], None], traces: bool = False) -> Driver:
         return Driver(
-            pool=pool, keep=keep, lost=self._lost, enough=lambda: not traces and self.rule.after is not None,
+            pool=pool, keep=keep, enough=lambda: not traces and self.rule.after is not None,
+            lost=lambda job, reason: dead_row(self.spec, job.skill, job.trials[0], reason),
             wanted=lambda job: traces or any(self.rule.wants(self.spec.labels[job.skill], each) for each in job.trials),
             words=lambda job: trials_of(job, self.spec), tell=self._tell,
             noted=(lambda job, why: None) if traces else self._note_lost,  # a job for traces decides no row
@@ -245,9 +246,6 @@ class _Session:
     def total(self) -> int:
         """Expected number of rows. A race needs fewer than planned."""
         return self.rule.total(len(self.log.done))
-
-    def _lost(self, job: ChunkJob, reason: str) -> Row:
-        return dead_row(self.spec, job.skill, job.trials[0], reason)
 
     def _note_lost(self, job: ChunkJob, why: str) -> None:
         """Store that trials ran without leaving rows, so that their next run is not taken for the first."""

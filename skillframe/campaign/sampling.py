@@ -32,7 +32,6 @@ from numpy.typing import NDArray
 
 from skillframe.config import coerce
 from skillframe.errors import InputError, UnknownName
-from skillframe.frames import Float
 
 Value = float | int | bool | str
 KINDS = ("uniform", "normal", "choice", "grid", "sobol", "values")
@@ -193,28 +192,16 @@ def _sobol(spec: Design, trials: Sequence[int]) -> Draws:
     names = sorted(n for n, axis in spec.vary.items() if axis.kind == "sobol")
     if not names or not len(trials):
         return {name: np.zeros(0) for name in names}
-    places = _sobol_places(spec, trials)
-    points = _sobol_points(spec.seed, len(names), int(places.max()))[places]
+    from scipy.stats import qmc
+
+    places = own = np.asarray(trials, dtype=np.intp)
+    if cells_of(spec.vary) != 1 or any(axis.kind == "values" for axis in spec.vary.values()):  # axes that run in order
+        order = np.random.default_rng(seed_sequence(spec.seed, 0, "sobol order")).permutation(spec.trials)
+        places = order[own]
+    scramble = np.random.default_rng(seed_sequence(spec.seed, 0, "sobol"))
+    sobol = qmc.Sobol(len(names), scramble=True, rng=scramble)
+    points = sobol.random_base2(max(1, int(places.max()).bit_length()))[places]  # a power of two of them
     ends = [(float(spec.vary[n].numbers[0]), float(spec.vary[n].numbers[1])) for n in names]
     return {
         name: low + (high - low) * points[:, i] for i, (name, (low, high)) in enumerate(zip(names, ends, strict=True))
     }
-
-
-def _sobol_places(spec: Design, trials: Sequence[int]) -> NDArray[np.intp]:
-    """Index of each trial's Sobol point: its number, or shuffled beside axes that run in order."""
-    own = np.asarray(trials, dtype=np.intp)
-    if cells_of(spec.vary) == 1 and all(axis.kind != "values" for axis in spec.vary.values()):
-        return own
-    order = np.random.default_rng(seed_sequence(spec.seed, 0, "sobol order")).permutation(spec.trials)
-    places: NDArray[np.intp] = order[own]
-    return places
-
-
-def _sobol_points(seed: int, dimension: int, last: int) -> Float:
-    """At least points 0 .. last of the scrambled sequence, (m, dimension). m is a power of two."""
-    from scipy.stats import qmc
-
-    scramble = np.random.default_rng(seed_sequence(seed, 0, "sobol"))
-    points: Float = qmc.Sobol(dimension, scramble=True, rng=scramble).random_base2(max(1, last.bit_length()))
-    return points

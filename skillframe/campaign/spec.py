@@ -16,7 +16,7 @@ from skillframe.campaign.sampling import KINDS, Axis, Value, cells_of, parse_axi
 from skillframe.campaign.statistics import Plan, plan_of
 from skillframe.config import build, in_si, read_toml
 from skillframe.config.units import DURATION, Quantity, require_within
-from skillframe.document.file import SkillSource, parse_source
+from skillframe.document.file import parse_source
 from skillframe.errors import InputError
 from skillframe.extend.drives import quantities, typed_value, unknown
 from skillframe.files.documents import refuse_other
@@ -209,7 +209,13 @@ class CampaignSpec:
         _check_numbers(file, path)
         if not file.skills:
             raise InputError(f"{path}: skills", "is empty", "name at least one skill file")
-        entries = [_source(text, path, i) for i, text in enumerate(file.skills)]
+        entries = []
+        for i, text in enumerate(file.skills):
+            try:
+                entries.append(parse_source(text, path.parent))
+            except InputError as error:
+                where = f"{path}: skills[{i}]"
+                raise InputError(where, f"{error.where!r} {error.problem}", error.fix) from None
         labels = [entry.label for entry in entries]
         for i, entry in enumerate(entries):
             where = f"{path}: skills[{i}]"
@@ -293,13 +299,6 @@ def _check_numbers(file: _File, path: Path) -> None:
                 "keep one of the two",
             )
     require_within(file.duration_s, file.duration_s, DURATION.unit, DURATION.range, f"{path}: duration_s")
-
-
-def _source(text: str, path: Path, index: int) -> SkillSource:
-    try:
-        return parse_source(text, path.parent)
-    except InputError as error:
-        raise InputError(f"{path}: skills[{index}]", f"{error.where!r} {error.problem}", error.fix) from None
 
 
 def _known(name: str, known: Mapping[str, Quantity], where: str) -> Quantity:
