@@ -111,21 +111,18 @@ def require_command(name: str) -> None:
     Raises:
         SkillframeError: it is absent.
     """
-    if name not in _own() and name not in _added():
-        raise _unknown(name)
-
-
-def _unknown(name: str) -> SkillframeError:
+    if name in _own() or name in _added():
+        return
     from skillframe.errors import UnknownName
     from skillframe.extend.homes import where_to_get
 
     left_out = _added(selected=False).get(name)
     if left_out is not None:
         where = " and ".join(left_out.distributions)
-        return SkillframeError(f"{name} is a command of {where}, which SKILLFRAME_PLUGINS leaves out")
+        raise SkillframeError(f"{name} is a command of {where}, which SKILLFRAME_PLUGINS leaves out")
     known = [*_own(), *_added()]
     missing = where_to_get("command", name, known, ())
-    return SkillframeError(missing) if missing else UnknownName("command", name, known)
+    raise SkillframeError(missing) if missing else UnknownName("command", name, known)
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})

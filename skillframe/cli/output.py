@@ -38,14 +38,11 @@ QUIET = "skillframe.quiet"
 def quiet_option(function: _F) -> _F:
     """`-q`: no progress and no notes. See `is_quiet`."""
     option = click.option(
-        "-q", "--quiet", is_flag=True, expose_value=False, callback=_silence,
+        "-q", "--quiet", is_flag=True, expose_value=False,
+        callback=lambda ctx, _, value: ctx.meta.update({QUIET: value}),
         help="No progress and no notes on stderr; warnings and errors stay.",
     )  # fmt: skip
     return option(function)
-
-
-def _silence(ctx: click.Context, param: click.Parameter, value: bool) -> None:
-    ctx.meta[QUIET] = value
 
 
 def is_quiet() -> bool:

@@ -40,6 +40,9 @@ def command(robot: str | None, check: bool, mass: str | None, no_meshes: bool, k
       skillframe robots panda
       skillframe robots my_robot.urdf --check --mass 33.5
     """
+    from skillframe.api.settings import of_robot
+    from skillframe.cli.output import emit_json
+    from skillframe.cli.settings import tell_keys
     from skillframe.errors import InputError
 
     for option, given in (("--mass", mass is not None), ("--no-meshes", no_meshes)):
@@ -50,7 +53,11 @@ def command(robot: str | None, check: bool, mass: str | None, no_meshes: bool, k
     if check and robot is None:
         raise InputError("--check", "checks one robot", "name it: skillframe robots my_robot.urdf --check")
     if keys:
-        _keys(as_json)
+        rows = list(of_robot())
+        if as_json:
+            emit_json(rows)
+        else:
+            tell_keys(rows)
     elif robot is None:
         _list(as_json)
     elif check:
@@ -58,18 +65,6 @@ def command(robot: str | None, check: bool, mass: str | None, no_meshes: bool, k
     else:
         _show(robot, as_json)
     return 0
-
-
-def _keys(as_json: bool) -> None:
-    from skillframe.api.settings import of_robot
-    from skillframe.cli.output import emit_json
-    from skillframe.cli.settings import tell_keys
-
-    rows = list(of_robot())
-    if as_json:
-        emit_json(rows)
-    else:
-        tell_keys(rows)
 
 
 def _list(as_json: bool) -> None:

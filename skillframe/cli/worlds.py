@@ -39,6 +39,7 @@ def command(world: str | None, settings: bool, pictures: Path | None, as_json: b
       skillframe worlds parts/fixture.toml --pictures parts
     """
     from skillframe.api.settings import of_trials, settings_of_world
+    from skillframe.cli.catalog import rows_of
     from skillframe.extend.records import make_scene, no_progress
     from skillframe.extend.registry import registry
 
@@ -58,21 +59,14 @@ def command(world: str | None, settings: bool, pictures: Path | None, as_json: b
         else:
             tell_settings(rows)
     elif world is None:
-        _list(as_json)
+        rows = rows_of(registry(), "world")
+        if as_json:
+            emit_json(rows)
+        else:
+            lines = [(row["name"], row["summary"], row["distribution"]) for row in rows]
+            table(("world", "what it is", "from"), lines, LIST_WIDTH)
     else:
         _show(world, as_json)
-
-
-def _list(as_json: bool) -> None:
-    from skillframe.cli.catalog import rows_of
-    from skillframe.extend.registry import registry
-
-    rows = rows_of(registry(), "world")
-    if as_json:
-        emit_json(rows)
-    else:
-        lines = [(row["name"], row["summary"], row["distribution"]) for row in rows]
-        table(("world", "what it is", "from"), lines, LIST_WIDTH)
 
 
 def _show(world: str, as_json: bool) -> None:
