@@ -28,7 +28,11 @@ class RunCommand(click.Command):
         """The options of the core, with those of plug-ins behind `--out`."""
         params = super().get_params(ctx)
         behind = next(i for i, each in enumerate(params, start=1) if each.name == "out")
-        return [*params[:behind], *map(_option, _outputs()), *params[behind:]]
+        files = []
+        for record in _outputs():
+            kind = OutputFile(*record.endings) if record.endings else click.Path(path_type=Path)
+            files.append(click.Option([f"--{record.name}"], type=kind, help=f"{record.summary}."))
+        return [*params[:behind], *files, *params[behind:]]
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """As click does, but for an absent plug-in's option print what to install."""
@@ -48,11 +52,6 @@ def _outputs() -> list[OutputType]:
     from skillframe.extend.registry import registry
 
     return [record for record in registry().records("output") if record.of == "run"]
-
-
-def _option(record: OutputType) -> click.Option:
-    kind = OutputFile(*record.endings) if record.endings else click.Path(path_type=Path)
-    return click.Option([f"--{record.name}"], type=kind, help=f"{record.summary}.")
 
 
 @click.command(name="run", cls=RunCommand)
