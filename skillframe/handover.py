@@ -9,7 +9,7 @@ checked before use:
   make the controller's output not finite, which the limits end as diverged.
 
 Rotations are checked in every tick unless the same array comes again; an impedance, built once per phase, is checked
-when another array comes. Changes in place are found within `SLOW_TICKS`, and a mirroring rotation within `RARE_TICKS`.
+when another array comes. Changes in place are found within `SLOW_TICKS`, and a mirroring rotation within 100 ticks.
 """
 
 from __future__ import annotations
@@ -26,8 +26,6 @@ from skillframe.skill import Command, Impedance, Observation, Skill, Status
 
 SLOW_TICKS = 10
 """Ticks between checks of goals and of slow changes: 10 ms at 1 kHz."""
-RARE_TICKS = 100
-"""Ticks between checks of dtypes and of mirroring rotations: 100 ms at 1 kHz."""
 ROTATION_SLACK = 1e-3
 """Largest entry of R^T R - 1: far above the rounding of an hour's products, or of single precision."""
 Answer = TypeVar("Answer")  #: what a method of a skill returns
@@ -178,7 +176,7 @@ class CommandCheck:
         Raises:
             SkillframeError: as `check_shapes`.
         """
-        slow, rare, faults = tick % SLOW_TICKS == 0, tick % RARE_TICKS == 0, []
+        slow, rare, faults = tick % SLOW_TICKS == 0, tick % 100 == 0, []  # rare: dtypes, and mirroring rotations
         if rare:
             check_shapes(self._skill, command, self._lead)
         rotation, (stiffness, damping) = self._shapes(command).pose.rotation, command.impedance

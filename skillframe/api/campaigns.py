@@ -192,13 +192,14 @@ class Campaign:
             return [self._written(skill_of(skill), name) for name, skill in skills.items()]
         alone = isinstance(skills, str | os.PathLike | LearnedSkill | Mapping)
         several: Sequence[Any] = [skills] if alone else skills  # type: ignore[assignment, list-item]
-        return [self._entry(skill) for skill in several]
-
-    def _entry(self, skill: Skills) -> str:
-        if isinstance(skill, str | os.PathLike):
-            return _absolute(os.fspath(skill), Path.cwd())
-        learned = skill_of(skill)
-        return self._written(learned, learned.name)
+        entries = []
+        for skill in several:
+            if isinstance(skill, str | os.PathLike):
+                entries.append(_absolute(os.fspath(skill), Path.cwd()))
+            else:
+                learned = skill_of(skill)
+                entries.append(self._written(learned, learned.name))
+        return entries
 
     def _written(self, skill: LearnedSkill, name: str) -> str:
         path = self._stage / f"{name}.skill.json"

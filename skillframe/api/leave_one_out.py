@@ -4,8 +4,8 @@ The skill is learned again without each demonstration. Compared are the directio
 explains (`explained`), the size of the set of directions that explain as much (`feasible_solid_angle_sr`, as the half
 opening of a cone), and whether the learner leaves the direction open, as all went one way (`ambiguous`). A
 demonstration contradicts the others if only without it there is a direction, or if it lowers the share by
-`CONTRADICTS`. It is needed if without it there is no direction, or an open one, or if the
-cone is `NEEDED` times as wide.
+more than 0.2. It is needed if without it there is no direction, or an open one, or if the cone is more than 1.5 times
+as wide.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ from skillframe.document import file
 from skillframe.errors import InputError
 from skillframe.extend.records import Document, LearnOptions, SkillType
 
-CONTRADICTS, NEEDED = 0.2, 1.5
 PARTS = (("translation", "push"), ("rotation", "turn"))
 
 
@@ -106,14 +105,14 @@ def said(name: str, word: str, whole: Found, without: Found) -> str:
     by = round(degrees(turned))
     moves = f"without it the {word} turns by {by} degree{'s' * (by != 1)}"
     shares = whole.explained, without.explained
-    if shares[0] is not None and shares[1] is not None and shares[1] - shares[0] > CONTRADICTS:
+    if shares[0] is not None and shares[1] is not None and shares[1] - shares[0] > 0.2:
         return (
             f"{name} contradicts the others: with it the {word} explains {100.0 * shares[0]:.0f} % of what was shown, "
             f"without it {100.0 * shares[1]:.0f} %; {moves}"
         )
     if without.open and not whole.open:
         return f"{name} is needed: without it all others went one way, and leave the {word} open; {moves}"
-    if whole.cone is not None and without.cone is not None and without.cone > NEEDED * whole.cone:
+    if whole.cone is not None and without.cone is not None and without.cone > 1.5 * whole.cone:
         return (
             f"{name} is needed: with it the {word} is known to about {degrees(whole.cone):.0f} degrees, without it to "
             f"{degrees(without.cone):.0f}; {moves}"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -55,7 +55,12 @@ def record(
     scene, draws = scene_of(world, given, depth=2)
     model = robot_of(robot)
     own = drive_of(model.spec)
-    person = _with(_person(teacher, model, scene), of_teacher)
+    person = _person(teacher, model, scene)
+    if "kind" in of_teacher:
+        raise InputError("--set teacher.kind", "is the teacher's", "name the teacher instead")
+    if of_teacher:  # numbers in SI, or texts with a unit
+        changed = build(type(person), of_teacher, f"--set {OF_TEACHER.removesuffix('.')}")
+        person = replace(person, **{name: getattr(changed, name) for name in of_teacher})
     if angle is not None:
         if own is None or own.aimed is None:
             text = f"is for machines that are taught by an operator, and {model.spec.name} is not"
@@ -87,16 +92,6 @@ def _person(teacher: str | Person | None, robot: RobotModel, scene: Scene) -> Pe
         text = f"are for the drive of a plug-in, which {robot.spec.name} does not have"
         raise InputError(type(person).__name__, text, "use TeacherSettings")
     return person
-
-
-def _with(person: Person, settings: Mapping[str, Any]) -> Person:
-    """A teacher with some settings changed, given as numbers in SI or as texts with a unit."""
-    if not settings:
-        return person
-    if "kind" in settings:
-        raise InputError("--set teacher.kind", "is the teacher's", "name the teacher instead")
-    changed = build(type(person), settings, f"--set {OF_TEACHER.removesuffix('.')}")
-    return replace(person, **{name: getattr(changed, name) for name in settings})
 
 
 def seeing(teacher: str | None, scene: Scene) -> Person:

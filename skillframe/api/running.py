@@ -24,7 +24,6 @@ from skillframe.extend.outputs import Moment, no_progress
 from skillframe.extend.registry import registry
 from skillframe.robot.audit import resistance_note
 from skillframe.robot.link_checks import guess_note
-from skillframe.robot.model import RobotModel
 from skillframe.skill import Skill
 from skillframe.world.scene import Scene
 
@@ -220,7 +219,8 @@ def once(
     learned = None if isinstance(skill, Skill) else skill_of(skill)
     model = robot_of(robot)
     if own is not None:
-        runnable, setup = own, _setup(model, scene, coc)
+        center = resolve_point(coc, scene.tool.frames)
+        runnable, setup = own, Setup(robot=model, scene=scene, center_of_compliance=center)
     else:
         assert learned is not None
         told = None if places is None else load_places(Path(places))
@@ -242,23 +242,14 @@ def once(
     if not result.success[0]:
         doubts = [text for text in (guess_note(model.spec), resistance_note(model)) if text]
         trace.meta["notes"] = [*trace.meta.get("notes", []), *doubts]
-    arms = result.arm_traces[0] if isinstance(result, ArmsResult) and result.arm_traces else {}
-    return SingleRun(trace=trace, arms=arms, interrupted=result.interrupted, unscored=_score(trace, scores))
-
-
-def _score(trace: Trace, names: Sequence[str]) -> SkillframeError | None:
-    """Store the scores in the trace's metadata. Returns the error of one that fails."""
-    if names:
+    unscored = None
+    if scores:
         try:
-            trace.meta["scores"] = score_notes(scores_of(trace, names))
+            trace.meta["scores"] = score_notes(scores_of(trace, scores))
         except ScoreFailed as error:
-            return error
-    return None
-
-
-def _setup(robot: RobotModel, scene: Scene, coc: str | None) -> Setup:
-    center = resolve_point(coc, scene.tool.frames)
-    return Setup(robot=robot, scene=scene, center_of_compliance=center)
+            unscored = error
+    arms = result.arm_traces[0] if isinstance(result, ArmsResult) and result.arm_traces else {}
+    return SingleRun(trace=trace, arms=arms, interrupted=result.interrupted, unscored=unscored)
 
 
 def _command(

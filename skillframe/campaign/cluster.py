@@ -35,11 +35,6 @@ LOOK_S, TELL_S = 0.1, 1.0
 GONE_S = 5.0
 """Wall time after which a job whose worker is gone is given up."""
 _MEMORY_LOGGER = "distributed.nanny.memory"
-_SETTINGS = {
-    "distributed.scheduler.allowed-failures": 0,
-    "distributed.worker.profile.enabled": False,  # sampling of stacks, 100 Hz by default, which nothing here reads
-    "distributed.admin.tick.interval": "1s",  # interval of measuring the event loop's delay
-}
 
 
 class _MemoryDeaths(logging.Handler):
@@ -119,7 +114,12 @@ class ClusterPool(Generic[WorkT]):
 
             self._stack.callback(restore)
             self._memory = handler
-            self._stack.enter_context(dask.config.set(_SETTINGS))
+            settings = {
+                "distributed.scheduler.allowed-failures": 0,
+                "distributed.worker.profile.enabled": False,  # stacks, sampled at 100 Hz, which nobody reads
+                "distributed.admin.tick.interval": "1s",  # interval of measuring the event loop's delay
+            }
+            self._stack.enter_context(dask.config.set(settings))
             self._client = self._connect(scheduler) if scheduler else self._start(workers, memory_bytes)
         except BaseException:
             self._stack.close()

@@ -16,7 +16,6 @@ from typing import Any
 from skillframe.campaign.provenance import Identity, compared, identity
 from skillframe.errors import SkillframeError
 
-LOOK_S = 0.25
 BACK_S = 10.0
 """Wall time after which a worker that died is expected at its old address."""
 
@@ -59,7 +58,7 @@ class Crew:
         if self._looking is not None and self._looking.done():
             if self._looking.exception() is None:
                 self._meet(self._looking.result())
-            self._looking, self._due = None, time.monotonic() + LOOK_S
+            self._looking, self._due = None, time.monotonic() + 0.25  # s between looks
         if self._looking is None and time.monotonic() >= self._due:
             self._looking = self._ask(self._client.scheduler.ncores())
         for address in [a for a, future in self._asked.items() if future.done()]:

@@ -30,7 +30,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import TracebackType
+from traceback import walk_tb
 from typing import Generic, NamedTuple, Protocol
 
 from skillframe.campaign.jobs import WorkT, listening
@@ -348,13 +348,8 @@ def is_trouble(error: BaseException) -> bool:
     always = (MemoryError, OSError, ImportError, UnknownName, MissingDependency, BadPlugin, PluginConflict, Unusable)
     if isinstance(error, (*always, ScoreFailed, CompilerFailed)):
         return True
-    return isinstance(error, InputError) and not FILES.isdisjoint(_modules(error.__traceback__))
-
-
-def _modules(traceback: TracebackType | None) -> Iterator[str]:
-    while traceback is not None:
-        yield str(traceback.tb_frame.f_globals.get("__name__"))
-        traceback = traceback.tb_next
+    modules = (str(frame.f_globals.get("__name__")) for frame, _ in walk_tb(error.__traceback__))
+    return isinstance(error, InputError) and not FILES.isdisjoint(modules)
 
 
 def looks_like_trouble(failure: str) -> bool:

@@ -276,7 +276,6 @@ else:
     ADVISORY = True
 
 NAME = "lock"
-NO_LINK = getattr(os, "O_NOFOLLOW", 0)  # 0 on Windows
 
 
 class FolderLock:
@@ -314,9 +313,10 @@ class FolderLock:
             except FileExistsError:
                 pid, host = holder(self._path.parent) or (0, "")
                 raise _may_be_writing(self._path, pid, host) from None
+        flags = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)  # Windows has no such flag
         while True:
             try:
-                descriptor = os.open(self._path, os.O_RDWR | os.O_CREAT | NO_LINK, 0o644)
+                descriptor = os.open(self._path, flags, 0o644)
             except OSError as error:
                 if error.errno == errno.ELOOP:
                     raise InputError(self._path, "is a link, and no lock of a campaign", "delete it") from None

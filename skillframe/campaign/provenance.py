@@ -40,7 +40,12 @@ def environment() -> dict[str, str]:
 @lru_cache(maxsize=8)
 def _environment(path: tuple[str, ...], selected: str | None) -> Mapping[str, str]:
     """Cached, since a process keeps running the code that it imported."""
-    return {"python": platform.python_version(), "platform": platform.platform(), "processor": _processor(),
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        processor = next(line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        processor = platform.processor() or platform.machine()
+    return {"python": platform.python_version(), "platform": platform.platform(), "processor": processor,
             **versions_on_disk()}  # fmt: skip
 
 
@@ -91,14 +96,6 @@ def code_hash(modules: Iterable[str]) -> str:
             if file.is_file() and file.suffix != ".pyc":
                 total.update(f"{module} {name} {file_hash(file)}\n".encode())
     return total.hexdigest()
-
-
-def _processor() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-        return next(line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
-    except (OSError, StopIteration):
-        return platform.processor() or platform.machine()
 
 
 def environment_differences(then: Mapping[str, str], now: Mapping[str, str]) -> list[str]:

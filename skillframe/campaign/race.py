@@ -82,7 +82,13 @@ class Race:
                 if (p_value := mcnemar_sequential(*counts)) < self.minima[first, second]:
                     self.minima[first, second] = p_value
                     self._ahead[first, second] = first if counts[0] > counts[1] else second
-            self._decide(dict(zip(self.minima, holm(list(self.minima.values())), strict=True)), open_pairs)
+            corrected = dict(zip(self.minima, holm(list(self.minima.values())), strict=True))
+            for pair in sorted(open_pairs, key=corrected.__getitem__):  # success counts order them, so one remains
+                (first, second), (won, lost) = pair, self._counts[pair]
+                better, worse = (first, second) if won > lost else (second, first)
+                if corrected[pair] <= self._keys.alpha and won != lost and better == self._ahead[pair]:
+                    counts = max(won, lost), min(won, lost)
+                    self.left.setdefault(worse, LeftOut(self._looked, better, *counts, corrected[pair]))
             if len(self._running()) == 1:
                 self.after = end - 1
 
@@ -114,15 +120,6 @@ class Race:
 
     def _running(self) -> list[str]:
         return [label for label in self._labels if label not in self.left]
-
-    def _decide(self, corrected: Mapping[tuple[str, str], float], pairs: Iterable[tuple[str, str]]) -> None:
-        """Leave out the worse of each decided pair. Success counts order the skills, so one remains."""
-        for pair in sorted(pairs, key=corrected.__getitem__):
-            (first, second), (won, lost) = pair, self._counts[pair]
-            better, worse = (first, second) if won > lost else (second, first)
-            if corrected[pair] <= self._keys.alpha and won != lost and better == self._ahead[pair]:
-                counts = max(won, lost), min(won, lost)
-                self.left.setdefault(worse, LeftOut(self._looked, better, *counts, corrected[pair]))
 
     def _more(self) -> int | None:
         running = self._running()

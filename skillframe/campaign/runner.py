@@ -128,7 +128,7 @@ def run_campaign(
     except OSError as error:  # of this session's files; errors within a trial were handled there
         raise CampaignError(
             f"{error.filename or folder}: {error.strerror or error}; finished rows are kept, put it right, then "
-            f"{_resume(folder)}"
+            f"type: skillframe campaign resume {folder}"
         ) from error
 
 
@@ -234,22 +234,18 @@ class _Session:
 
     def _driver(self, pool: Pool[ChunkJob], keep: Callable[[list[Row]], None], traces: bool = False) -> Driver:
         return Driver(
-            pool=pool, keep=keep, lost=self._lost, enough=lambda: not traces and self.rule.after is not None,
+            pool=pool, keep=keep, enough=lambda: not traces and self.rule.after is not None,
+            lost=lambda job, reason: dead_row(self.spec, job.skill, job.trials[0], reason),
             wanted=lambda job: traces or any(self.rule.wants(self.spec.labels[job.skill], each) for each in job.trials),
-            words=lambda job: trials_of(job, self.spec), noted=self._forget if traces else self._note_lost,
-            tell=self._tell, fix=_resume(self.spec.folder),
+            words=lambda job: trials_of(job, self.spec), tell=self._tell,
+            noted=(lambda job, why: None) if traces else self._note_lost,  # a job for traces decides no row
+            fix=f"type: skillframe campaign resume {self.spec.folder}",
         )  # fmt: skip
 
     @property
     def total(self) -> int:
         """Expected number of rows. A race needs fewer than planned."""
         return self.rule.total(len(self.log.done))
-
-    def _lost(self, job: ChunkJob, reason: str) -> Row:
-        return dead_row(self.spec, job.skill, job.trials[0], reason)
-
-    def _forget(self, job: ChunkJob, why: str) -> None:
-        """Do nothing: a job for traces decides no row."""
 
     def _note_lost(self, job: ChunkJob, why: str) -> None:
         """Store that trials ran without leaving rows, so that their next run is not taken for the first."""
@@ -320,10 +316,6 @@ class _Session:
 
     def _rows(self) -> Sequence[Row]:
         return ordered(self.spec, self.log.done, self.rule.after, self.rule.left)
-
-
-def _resume(folder: Path) -> str:
-    return f"type: skillframe campaign resume {folder}"
 
 
 def trace_path(folder: Path, trial: int, label: str) -> Path:

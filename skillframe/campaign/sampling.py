@@ -32,7 +32,6 @@ from numpy.typing import NDArray
 
 from skillframe.config import coerce
 from skillframe.errors import InputError, UnknownName
-from skillframe.frames import Float
 
 Value = float | int | bool | str
 KINDS = ("uniform", "normal", "choice", "grid", "sobol", "values")
@@ -110,7 +109,7 @@ def parse_axis(value: Any, where: str) -> Axis:
         raise InputError(where, f"expected a list of values, got {content!r}")
     if not content:
         raise InputError(where, "is empty", "give at least one value")
-    values = tuple(_listed_value(v, f"{where}[{i}]") for i, v in enumerate(content))
+    values = tuple(v if isinstance(v, bool | str | int) else _number(v, f"{where}[{i}]") for i, v in enumerate(content))
     if kind == "grid" and len(set(values)) != len(values):
         raise InputError(where, f"holds a value twice: {content!r}", "give every value of a grid once")
     return Axis(kind=kind, numbers=values)
@@ -121,14 +120,6 @@ def _number(value: Any, where: str) -> float:
     if not math.isfinite(number):
         raise InputError(where, f"is {number}", "give a finite number")
     return number
-
-
-def _listed_value(value: Any, where: str) -> Value:
-    if isinstance(value, bool | str):
-        return value
-    if isinstance(value, int):
-        return value
-    return _number(value, where)
 
 
 Draws = dict[str, NDArray[Any]]
@@ -182,8 +173,14 @@ def draws(spec: Design, trials: Sequence[int]) -> Draws:
         numbers = spec.vary[name].numbers
         result[name] = _column([numbers[trial // stride % len(numbers)] for trial in trials])
         stride *= len(numbers)
-    placed = {**result, **_sobol(spec, trials)}
-    return {name: placed[name] if name in placed else _independent(spec, name, trials) for name in spec.vary}
+    result |= _sobol(spec, trials)
+    for name, axis in spec.vary.items():
+        if axis.kind == "values":
+            result[name] = _column([axis.numbers[trial] for trial in trials])
+        elif name not in result:
+            rngs = (np.random.default_rng(seed_sequence(spec.seed, trial, name)) for trial in trials)
+            result[name] = _column([axis.draw(rng) for rng in rngs])
+    return {name: result[name] for name in spec.vary}
 
 
 def _column(values: list[Value]) -> NDArray[Any]:
@@ -191,40 +188,20 @@ def _column(values: list[Value]) -> NDArray[Any]:
     return np.array(values) if alike else np.array(values, dtype=object)
 
 
-def _independent(spec: Design, name: str, trials: Sequence[int]) -> NDArray[Any]:
-    axis = spec.vary[name]
-    if axis.kind == "values":
-        return _column([axis.numbers[trial] for trial in trials])
-    rngs = (np.random.default_rng(seed_sequence(spec.seed, trial, name)) for trial in trials)
-    return _column([axis.draw(rng) for rng in rngs])
-
-
 def _sobol(spec: Design, trials: Sequence[int]) -> Draws:
     names = sorted(n for n, axis in spec.vary.items() if axis.kind == "sobol")
     if not names or not len(trials):
         return {name: np.zeros(0) for name in names}
-    places = _sobol_places(spec, trials)
-    points = _sobol_points(spec.seed, len(names), int(places.max()))[places]
+    from scipy.stats import qmc
+
+    places = own = np.asarray(trials, dtype=np.intp)
+    if cells_of(spec.vary) != 1 or any(axis.kind == "values" for axis in spec.vary.values()):  # axes that run in order
+        order = np.random.default_rng(seed_sequence(spec.seed, 0, "sobol order")).permutation(spec.trials)
+        places = order[own]
+    scramble = np.random.default_rng(seed_sequence(spec.seed, 0, "sobol"))
+    sobol = qmc.Sobol(len(names), scramble=True, rng=scramble)
+    points = sobol.random_base2(max(1, int(places.max()).bit_length()))[places]  # a power of two of them
     ends = [(float(spec.vary[n].numbers[0]), float(spec.vary[n].numbers[1])) for n in names]
     return {
         name: low + (high - low) * points[:, i] for i, (name, (low, high)) in enumerate(zip(names, ends, strict=True))
     }
-
-
-def _sobol_places(spec: Design, trials: Sequence[int]) -> NDArray[np.intp]:
-    """Index of each trial's Sobol point: its number, or shuffled beside axes that run in order."""
-    own = np.asarray(trials, dtype=np.intp)
-    if cells_of(spec.vary) == 1 and all(axis.kind != "values" for axis in spec.vary.values()):
-        return own
-    order = np.random.default_rng(seed_sequence(spec.seed, 0, "sobol order")).permutation(spec.trials)
-    places: NDArray[np.intp] = order[own]
-    return places
-
-
-def _sobol_points(seed: int, dimension: int, last: int) -> Float:
-    """At least points 0 .. last of the scrambled sequence, (m, dimension). m is a power of two."""
-    from scipy.stats import qmc
-
-    scramble = np.random.default_rng(seed_sequence(seed, 0, "sobol"))
-    points: Float = qmc.Sobol(dimension, scramble=True, rng=scramble).random_base2(max(1, last.bit_length()))
-    return points

@@ -16,14 +16,13 @@ from skillframe.campaign.sampling import KINDS, Axis, Value, cells_of, parse_axi
 from skillframe.campaign.statistics import Plan, plan_of
 from skillframe.config import build, in_si, read_toml
 from skillframe.config.units import DURATION, Quantity, require_within
-from skillframe.document.file import SkillSource, parse_source
+from skillframe.document.file import parse_source
 from skillframe.errors import InputError
 from skillframe.extend.drives import quantities, typed_value, unknown
 from skillframe.files.documents import refuse_other
 
 DURATION_S: float = DURATION.nominal
 """Simulated time after which a trial has failed, several times that of an insertion."""
-MOST_TRIALS = 10_000_000  # more would exceed the memory
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -203,12 +202,20 @@ class CampaignSpec:
         Raises:
             InputError, UnknownName: as `from_toml`.
         """
+        from skillframe.extend.registry import registry
+
         file = build(_File, table, f"{path}: campaign")
-        known = quantities(params or _world_params(place_of(file.world, path.parent)))
+        known = quantities(params or registry().world(place_of(file.world, path.parent)).params)
         _check_numbers(file, path)
         if not file.skills:
             raise InputError(f"{path}: skills", "is empty", "name at least one skill file")
-        entries = [_source(text, path, i) for i, text in enumerate(file.skills)]
+        entries = []
+        for i, text in enumerate(file.skills):
+            try:
+                entries.append(parse_source(text, path.parent))
+            except InputError as error:
+                where = f"{path}: skills[{i}]"
+                raise InputError(where, f"{error.where!r} {error.problem}", error.fix) from None
         labels = [entry.label for entry in entries]
         for i, entry in enumerate(entries):
             where = f"{path}: skills[{i}]"
@@ -219,13 +226,10 @@ class CampaignSpec:
                 raise InputError(where, f"no such file: {missing[0]}", "paths are relative to the campaign file")
         if file.expect.skill is not None and file.expect.skill not in labels:
             raise InputError(f"{path}: expect.skill", f"no skill is called {file.expect.skill!r}; there are {labels}")
-        if file.scores:
-            from skillframe.extend.registry import registry
-
-            for i, name in enumerate(file.scores):
-                registry().score(name)
-                if file.scores.index(name) != i:
-                    raise InputError(f"{path}: scores[{i}]", f"{name!r} is named twice", "name it once")
+        for i, name in enumerate(file.scores):
+            registry().score(name)
+            if file.scores.index(name) != i:
+                raise InputError(f"{path}: scores[{i}]", f"{name!r} is named twice", "name it once")
         given = flatten(file.vary, f"{path}: vary")
         vary = {name: _axis(name, value, known, file, path) for name, value in given.items()}
         fixed = {
@@ -266,17 +270,11 @@ def flatten(table: Mapping[str, Any], where: str) -> dict[str, Any]:
     return flat
 
 
-def _world_params(name: str) -> type:
-    from skillframe.extend.registry import registry
-
-    return registry().world(name).params
-
-
 def _check_numbers(file: _File, path: Path) -> None:
     width, rate = file.stop.interval_width, file.expect.rate
     checks = [
         ("seed", file.seed, file.seed >= 0, "give zero or more"),
-        ("trials", file.trials, 1 <= file.trials <= MOST_TRIALS, f"give 1 to {MOST_TRIALS}"),
+        ("trials", file.trials, 1 <= file.trials <= 10_000_000, "give 1 to 10000000"),  # more would exceed the memory
         ("stop.interval_width", width, width is None or 0.0 < width < 1.0, "give a number between 0 and 1"),
         ("expect.rate", rate, rate is None or 0.0 <= rate <= 1.0, "give a number from 0 to 1"),
     ]
@@ -301,13 +299,6 @@ def _check_numbers(file: _File, path: Path) -> None:
                 "keep one of the two",
             )
     require_within(file.duration_s, file.duration_s, DURATION.unit, DURATION.range, f"{path}: duration_s")
-
-
-def _source(text: str, path: Path, index: int) -> SkillSource:
-    try:
-        return parse_source(text, path.parent)
-    except InputError as error:
-        raise InputError(f"{path}: skills[{index}]", f"{error.where!r} {error.problem}", error.fix) from None
 
 
 def _known(name: str, known: Mapping[str, Quantity], where: str) -> Quantity:

@@ -32,8 +32,6 @@ ROWS, RESULTS = "rows.jsonl", "results.csv"  #: files of the trials: as they end
 FORMAT, VERSION = "skillframe.campaign", 1
 ROWS_VERSION = 3
 """Version 1 had no checksums; 2 had a JSON object with all columns per row."""
-PACKED = 3
-BINARY = getattr(os, "O_BINARY", 0)  # Windows would turn line ends into two bytes otherwise
 BLOCK = 4096
 """Rows checked against the campaign's samples at a time; each check makes the Sobol sequence anew."""
 RAN_ON = "ran_on"
@@ -82,14 +80,20 @@ class RowLog:
         self.done, self.sessions, self.unchecked = found.done, list(found.sessions), found.unchecked
         self._version, self._next, self._stated = found.version, found.layouts, dict[RowLayout, int]()
         self.environments = found.environments
-        self._descriptor = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | BINARY, 0o666)
+        binary = getattr(os, "O_BINARY", 0)  # Windows would turn line ends into two bytes otherwise
+        self._descriptor = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND | binary, 0o666)
         if os.fstat(self._descriptor).st_size == 0:
             self._write([{"format": FORMAT, "version": ROWS_VERSION, "campaign": campaign}])
 
     def append(self, rows: Iterable[Row], environment: Environment | None = None) -> list[Row]:
         """Store rows and their environment. Returns the new ones. A stored trial keeps its first row."""
         fresh = [row for row in rows if (row["trial"], row["skill"]) not in self.done]
-        ran_on = None if environment is None or not fresh else self._number(environment)
+        ran_on = None
+        if environment is not None and fresh:
+            if environment not in self.environments:
+                self.note({RAN_ON: dict(environment)})
+                self.environments.append(environment)
+            ran_on = self.environments.index(environment)
         self._write(self._records(fresh, ran_on))
         for row in fresh:  # before the sync, which Ctrl-C may interrupt
             self.done.add(row, ran_on)
@@ -98,7 +102,7 @@ class RowLog:
 
     def _records(self, rows: Sequence[Row], ran_on: int | None) -> Iterator[Mapping[str, Any]]:
         for row in rows:
-            if self._version < PACKED:
+            if self._version < 3:
                 where = {} if ran_on is None else {RAN_ON: ran_on}
                 yield {key: encode(value) for key, value in row.items()} | where
                 continue
@@ -108,13 +112,6 @@ class RowLog:
                 self._next += 1
                 yield layout.record(self._stated[layout])
             yield line_of(self._stated[layout], layout, row)
-
-    def _number(self, environment: Environment) -> int:
-        """Number of an environment, which is stored if new."""
-        if environment not in self.environments:
-            self.note({RAN_ON: dict(environment)})
-            self.environments.append(environment)
-        return self.environments.index(environment)
 
     def note(self, session: Mapping[str, Any]) -> None:
         """Store a note about this session (environment, workers, wall time)."""
@@ -290,7 +287,7 @@ def _record(path: Path, number: int, line: bytes, intact: bool | None) -> Row:
 
 
 def _plain(path: Path, number: int, record: Row) -> tuple[Row, int | None]:
-    """A row stored before version `PACKED`, and the number of its environment."""
+    """A row stored before version 3, and the number of its environment."""
     ran_on = record.pop(RAN_ON, None)
     try:
         return decode(record), ran_on if isinstance(ran_on, int) else None

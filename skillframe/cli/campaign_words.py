@@ -41,6 +41,8 @@ def conclude(folder: Path, spec: CampaignSpec, summary: dict[str, Any], as_json:
 
 
 def _tell(folder: Path, spec: CampaignSpec, summary: dict[str, Any]) -> None:
+    from skillframe.campaign.race import told
+
     click.echo(f"{spec.robot_name} in {spec.world_name}, {summary['planned_trials']} trials planned")
     show_rates(summary["skills"])
     for pair in summary["comparisons"]:
@@ -48,25 +50,20 @@ def _tell(folder: Path, spec: CampaignSpec, summary: dict[str, Any]) -> None:
         click.echo(f"  only the first succeeds in {pair['only_first']}, only the second in {pair['only_second']}")
         click.echo(f"  {_p_value(pair)}{pair['method']}")
     if "race" in summary:
-        _tell_race(summary["race"], summary["planned_trials"])
+        race = summary["race"]
+        for label, found in race["left_out"].items():
+            click.echo(told(label, found, summary["planned_trials"], race["correction"]))
+        if race["best"] is not None:
+            click.echo(f"race: {race['best']} is the best, known after {race['looked_after']} trials")
+        else:
+            more = f"; about {race['more']} trials more would do, if the rates stay as they are" if race["more"] else ""
+            click.echo(f"race: {', '.join(race['not_told_apart'])} do not differ significantly{more}")
     elif summary["stopped_after_trial"] is not None:
         click.echo(f"stopped early after trial {summary['stopped_after_trial']}: the intervals are narrow enough")
     if (found := summary.get("verdict")) is not None:
         asked = f"{found['skill']} to succeed in at least {100.0 * found['required_rate']:g} % of trials"
         click.echo(f"required: {asked}; verdict: {found['verdict']} ({found['why']})")
     click.echo(f"results: {folder / 'results.csv'}")
-
-
-def _tell_race(race: dict[str, Any], trials: int) -> None:
-    from skillframe.campaign.race import told
-
-    for label, found in race["left_out"].items():
-        click.echo(told(label, found, trials, race["correction"]))
-    if race["best"] is not None:
-        click.echo(f"race: {race['best']} is the best, known after {race['looked_after']} trials")
-        return
-    more = f"; about {race['more']} trials more would do, if the rates stay as they are" if race["more"] else ""
-    click.echo(f"race: {', '.join(race['not_told_apart'])} do not differ significantly{more}")
 
 
 def _p_value(pair: dict[str, Any]) -> str:
@@ -83,7 +80,8 @@ def show_rates(skills: dict[str, dict[str, Any]]) -> None:
 
     rows = [
         [
-            label, _trials(s), s["successes"], "-" if s["rate"] is None else f"{s['rate']:.3f}",
+            label, f"{s['trials']}{', left out' * ('left_out_after' in s)}", s["successes"],
+            "-" if s["rate"] is None else f"{s['rate']:.3f}",
             "none" if s["interval_95"] is None else f"{s['interval_95'][0]:.3f} .. {s['interval_95'][1]:.3f}",
         ]
         for label, s in skills.items()
@@ -105,7 +103,3 @@ def show_rates(skills: dict[str, dict[str, Any]]) -> None:
             causes[cause_of(text)] += count
         for cause, count in causes.most_common(3):
             click.echo(f"  {label}: {count} x {cause}")
-
-
-def _trials(s: dict[str, Any]) -> str:
-    return f"{s['trials']}, left out" if "left_out_after" in s else str(s["trials"])

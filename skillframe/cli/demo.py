@@ -19,7 +19,7 @@ import click
 
 from skillframe.cli.options import COUNT, SEED, robot_option
 from skillframe.cli.output import bold, emit_json, is_quiet
-from skillframe.errors import need
+from skillframe.errors import InputError, need
 from skillframe.files import write_whole
 
 MARKER = ".skillframe-demo"
@@ -60,8 +60,6 @@ rate = {rate:g}
 "fixture.tilt_y" = {{ uniform = [-0.12, 0.12] }}
 """
 STEPS = 10
-NOT_MET = 1
-"""Exit code of a campaign below its threshold, and of a claim that is not certified; both are reported."""
 PROOF, CERTIFIED = "proof", "valley"
 """Folder of the certificate, and the task with the fastest trials, whose skill it covers."""
 CERTIFY = ["certify", "run"]
@@ -87,12 +85,17 @@ def command(out: Path, robot: str, trials: int, rate: float, workers: int, seed:
     Example:
       skillframe demo --out demo
     """
-    from skillframe.cli.main import require_command
+    from skillframe.cli.main import require_command, run
 
     require_command("report")
     for library in ("mujoco", "pinocchio", "distributed", "cryptography"):
         need(library)
-    _make_room(out)
+    if out.exists() and (not out.is_dir() or (any(out.iterdir()) and not (out / MARKER).exists())):
+        raise InputError(out, "is there already and was not made by demo", "choose another --out")
+    if out.exists():
+        shutil.rmtree(out)
+    (out / "demonstrations").mkdir(parents=True)
+    write_whole(out / MARKER, b"made by skillframe demo, which clears this folder\n")
     began = time.perf_counter()
     for name, _, template, _ in TASKS:
         text = template.format(trials=trials, robot=robot, rate=rate)
@@ -101,9 +104,10 @@ def command(out: Path, robot: str, trials: int, rate: float, workers: int, seed:
     with redirect_stdout(sys.stderr) if as_json else nullcontext():
         for step in _steps(out, robot, trials, rate, workers, seed):  # one at a time, as it copies files in between
             steps.append(step)
-            code = _type(step, len(steps), quiet)
+            click.echo(bold(f"\n[{len(steps)} of {STEPS}] $ skillframe {shlex.join(step)}"))
+            code = run([*step, "--quiet"] if quiet else step)
             certified = certified or (step[: len(CERTIFY)] == CERTIFY and code == 0)
-            if code and not (code == NOT_MET and step[0] in ("campaign", "certify")):
+            if code and not (code == 1 and step[0] in ("campaign", "certify")):  # 1: a rate or claim is not met
                 return code
     spent = time.perf_counter() - began
     if as_json:
@@ -127,22 +131,6 @@ def _outcome(out: Path, robot: str, steps: list[list[str]], wall_s: float, certi
         "report": str(out / "report.html"), "campaigns": campaigns, "certified": certified,
         "certificate": str(out / PROOF / "certificate.json"), "commands": typed, "wall_s": wall_s,
     }  # fmt: skip
-
-
-def _make_room(out: Path) -> None:
-    """Make an empty folder, or clear that of an earlier demo.
-
-    Raises:
-        InputError: the folder holds other files.
-    """
-    from skillframe.errors import InputError
-
-    if out.exists() and (not out.is_dir() or (any(out.iterdir()) and not (out / MARKER).exists())):
-        raise InputError(out, "is there already and was not made by demo", "choose another --out")
-    if out.exists():
-        shutil.rmtree(out)
-    (out / "demonstrations").mkdir(parents=True)
-    write_whole(out / MARKER, b"made by skillframe demo, which clears this folder\n")
 
 
 def _steps(out: Path, robot: str, trials: int, rate: float, workers: int, seed: int) -> Iterator[list[str]]:
@@ -176,10 +164,3 @@ def _copy(files: list[str], folder: Path) -> None:
     folder.mkdir(exist_ok=True)
     for file in files:
         shutil.copy(file, folder)
-
-
-def _type(step: list[str], number: int, quiet: bool) -> int:
-    from skillframe.cli.main import run
-
-    click.echo(bold(f"\n[{number} of {STEPS}] $ skillframe {shlex.join(step)}"))
-    return run([*step, "--quiet"] if quiet else step)

@@ -7,7 +7,7 @@ import re
 import shutil
 import sys
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from importlib.util import find_spec
@@ -20,7 +20,6 @@ from skillframe.errors import EXTRAS
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
 COMPILERS = ("cc", "gcc", "clang")
-LOWEST_PYTHON = (3, 11)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -68,21 +67,25 @@ def command(as_json: bool) -> int:
 
 def examine() -> Iterator[Check]:
     """Everything that skillframe uses, the required first."""
-    yield _python()
-    yield from _libraries()
+    version = ".".join(map(str, sys.version_info[:3]))
+    fix = "install Python 3.11 or newer, then: make install" if sys.version_info < (3, 11) else ""
+    yield Check(name="python", found=version, needed_for="everything", required=True, fix=fix)
+    for needed in _requirements("skillframe"):
+        if not needed.extra:
+            fix = "" if needed.met else f"{sys.executable} -m pip install '{needed}'"
+            yield Check(name=needed.name, found=needed.found, needed_for="the core", required=True, fix=fix)
     yield from _extras("skillframe")
     yield _compiler()
-    yield from _of_plugins()
-    yield _browser()
+    from skillframe.extend.registry import registry
+
+    for each in registry().records("requirement"):
+        found = each.find()
+        yield Check(name=each.name, found=found, needed_for=each.summary, fix="" if found else each.fix())
+    found = next((path for name in BROWSERS if (path := shutil.which(name))), "")
+    fix = "" if found else "sudo apt install chromium (only the tests that open reports need it)"
+    yield Check(name="browser", found=found, needed_for="tests that open reports", fix=fix)
     yield _recordings()
     yield from _plugins()
-
-
-def _python() -> Check:
-    version = ".".join(map(str, sys.version_info[:3]))
-    old = sys.version_info[:2] < LOWEST_PYTHON
-    fix = f"install Python {'.'.join(map(str, LOWEST_PYTHON))} or newer, then: make install" if old else ""
-    return Check(name="python", found=version, needed_for="everything", required=True, fix=fix)
 
 
 class _Requirement(NamedTuple):
@@ -112,13 +115,6 @@ def _requirements(distribution: str) -> Iterator[_Requirement]:
         yield _Requirement(match.group(1), match.group(2) or "0", found, extra.group(1) if extra else "")
 
 
-def _libraries() -> Iterator[Check]:
-    for needed in _requirements("skillframe"):
-        if not needed.extra:
-            fix = "" if needed.met else f"{sys.executable} -m pip install '{needed}'"
-            yield Check(name=needed.name, found=needed.found, needed_for="the core", required=True, fix=fix)
-
-
 def _extras(distribution: str) -> Iterator[Check]:
     requirements = list(_requirements(distribution))
     for extra in dict.fromkeys(each.extra for each in requirements if each.extra not in ("", "all")):
@@ -145,20 +141,6 @@ def _compiler() -> Check:
     return Check(name="C compiler", found=path, needed_for="building FMUs", fix=fix)
 
 
-def _of_plugins() -> Iterator[Check]:
-    from skillframe.extend.registry import registry
-
-    for each in registry().records("requirement"):
-        found = each.find()
-        yield Check(name=each.name, found=found, needed_for=each.summary, fix="" if found else each.fix())
-
-
-def _browser() -> Check:
-    path = next((found for name in BROWSERS if (found := shutil.which(name))), "")
-    fix = "" if path else "sudo apt install chromium (only the tests that open reports need it)"
-    return Check(name="browser", found=path, needed_for="tests that open reports", fix=fix)
-
-
 def _recordings() -> Check:
     setting = os.environ.get("SKILLFRAME_RECORDINGS", "")
     found = setting if setting and os.path.isdir(setting) else ""
@@ -169,21 +151,18 @@ def _recordings() -> Check:
     return Check(name="recordings", found=found, needed_for="tests on real recordings", fix=fix)
 
 
-def _provided(provides: Sequence[str]) -> str:
-    counts = Counter(each.split(":", 1)[0] for each in provides)
-    return ", ".join(f"{count} {kind}{'s' * (count != 1)}" for kind, count in counts.items()) or "nothing"
-
-
 def _plugins() -> Iterator[Check]:
     from skillframe.extend.registry import registry
 
     before = ""
     for plugin in registry().plugins:
+        counts = Counter(each.split(":", 1)[0] for each in plugin.provides)
+        provided = ", ".join(f"{count} {kind}{'s' * (count != 1)}" for kind, count in counts.items())
         fix = f"{plugin.error}; {sys.executable} -m pip install --upgrade {plugin.distribution}" if plugin.error else ""
         yield Check(
             name=f"plug-in {plugin.name}",
             found=f"{plugin.distribution} {plugin.version}",
-            needed_for=_provided(plugin.provides),
+            needed_for=provided or "nothing",
             fix=fix,
         )
         if plugin.distribution not in ("skillframe", before):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -101,8 +101,10 @@ def _line(row: BuiltFmu) -> str:
 
 
 def _check(file: str, as_json: bool, allow: bool) -> int:
+    from skillframe.cli.output import table
     from skillframe.fmu.build import find_fmu
-    from skillframe.fmu.check import check_fmu
+    from skillframe.fmu.check import check_fmu, confinement_in_words
+    from skillframe.fmu.inspection import inspect_fmu
 
     path = find_fmu(file)
     found = check_fmu(path)
@@ -110,18 +112,10 @@ def _check(file: str, as_json: bool, allow: bool) -> int:
         from skillframe.fmu.extract import allow as add
 
         click.echo(f"allowed: {add(path)}", err=True)
+    code = 1 if found["problems"] else 0
     if as_json:
         click.echo(json.dumps(found))
-    else:
-        _print_check(path, found)
-    return 1 if found["problems"] else 0
-
-
-def _print_check(path: Path, found: dict[str, Any]) -> None:
-    from skillframe.cli.output import table
-    from skillframe.fmu.check import confinement_in_words
-    from skillframe.fmu.inspection import inspect_fmu
-
+        return code
     for key, value in {**found, "confinement": confinement_in_words(found["confinement"])}.items():
         text = ", ".join(map(str, value)) if isinstance(value, list) else str(value)
         click.echo(f"{key.replace('_', ' ')}: {text or 'none'}")
@@ -134,6 +128,7 @@ def _print_check(path: Path, found: dict[str, Any]) -> None:
             ("variable", "what", "start", "unit", "description"),
             [(v.name, v.causality, start or "", v.unit, v.text) for v, start in zip(rows, starts, strict=True)],
         )
+    return code
 
 
 @command.command("simulate")

@@ -63,8 +63,16 @@ class Listing(click.Group):
         if args and args[0] in self.list_commands(ctx):
             ctx.args = list(args)
             return ctx.args
-        if args and not ctx.resilient_parsing and (missing := self._missing(args[0])):
-            raise SkillframeError(missing)
+        if args and not ctx.resilient_parsing:
+            from skillframe.extend.homes import where_to_get
+
+            name, left_out = args[0], self._added(selected=False).get(args[0])
+            if left_out is not None:
+                where = " and ".join(left_out.distributions)
+                text = f"{self.name} {name} is a command of {where}, which SKILLFRAME_PLUGINS leaves out"
+                raise SkillframeError(text)
+            if missing := where_to_get("command", f"{self.name}.{name}", [str(self.name)], ()):
+                raise SkillframeError(missing)
         return click.Command.parse_args(self, ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -82,13 +90,3 @@ class Listing(click.Group):
         ahead = f"{self.name}."
         found = plugin_commands().items()
         return {n.removeprefix(ahead): each for n, each in found if n.startswith(ahead) and each.selected == selected}
-
-    def _missing(self, name: str) -> str:
-        """What to do for a command of an absent plug-in, "" for a name that no plug-in is known to bring."""
-        from skillframe.extend.homes import where_to_get
-
-        left_out = self._added(selected=False).get(name)
-        if left_out is not None:
-            where = " and ".join(left_out.distributions)
-            return f"{self.name} {name} is a command of {where}, which SKILLFRAME_PLUGINS leaves out"
-        return where_to_get("command", f"{self.name}.{name}", [str(self.name)], ())

@@ -111,21 +111,18 @@ def require_command(name: str) -> None:
     Raises:
         SkillframeError: it is absent.
     """
-    if name not in _own() and name not in _added():
-        raise _unknown(name)
-
-
-def _unknown(name: str) -> SkillframeError:
+    if name in _own() or name in _added():
+        return
     from skillframe.errors import UnknownName
     from skillframe.extend.homes import where_to_get
 
     left_out = _added(selected=False).get(name)
     if left_out is not None:
         where = " and ".join(left_out.distributions)
-        return SkillframeError(f"{name} is a command of {where}, which SKILLFRAME_PLUGINS leaves out")
+        raise SkillframeError(f"{name} is a command of {where}, which SKILLFRAME_PLUGINS leaves out")
     known = [*_own(), *_added()]
     missing = where_to_get("command", name, known, ())
-    return SkillframeError(missing) if missing else UnknownName("command", name, known)
+    raise SkillframeError(missing) if missing else UnknownName("command", name, known)
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110})
@@ -153,7 +150,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def run(arguments: Sequence[str], debug: bool = False) -> int:
     """Run a command line and return its exit code. Messages go to stderr. -q may stand anywhere."""
-    _print_anything()
+    for stream in (sys.stdout, sys.stderr):  # print anything, whatever the terminal's encoding
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     quiet = [word for word in arguments if word in ("-q", "--quiet")]
     arguments = [*quiet[:1], *(word for word in arguments if word not in quiet)]
     try:
@@ -179,7 +178,11 @@ def run(arguments: Sequence[str], debug: bool = False) -> int:
         click.echo(f"error: {_of_the_system(error)}", err=True)
         return 2
     except Exception as error:
-        return _internal(error, debug)
+        if debug:
+            raise
+        text = f"{type(error).__name__}: {error} (run again with --debug for the traceback)"
+        click.echo(f"internal error: {text}", err=True)
+        return 3
     return result if isinstance(result, int) else 0
 
 
@@ -189,12 +192,6 @@ def _of_usage(error: click.ClickException, arguments: Sequence[str]) -> str:
     typed = next((word for word in arguments[:2] if word in COMMANDS), "")
     command = f"skillframe {typed}".strip() if context is None else context.command_path
     return f"{said[:1].lower()}{said[1:]} (help: {command} --help)"
-
-
-def _print_anything() -> None:
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
 
 
 def _of_the_system(error: OSError | MemoryError) -> str:
@@ -223,13 +220,6 @@ def _discard_output() -> None:
         sys.stdout.flush()
     except OSError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def _internal(error: Exception, debug: bool) -> int:
-    if debug:
-        raise error
-    click.echo(f"internal error: {type(error).__name__}: {error} (run again with --debug for the traceback)", err=True)
-    return 3
 
 
 if __name__ == "__main__":

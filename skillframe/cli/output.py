@@ -38,14 +38,11 @@ QUIET = "skillframe.quiet"
 def quiet_option(function: _F) -> _F:
     """`-q`: no progress and no notes. See `is_quiet`."""
     option = click.option(
-        "-q", "--quiet", is_flag=True, expose_value=False, callback=_silence,
+        "-q", "--quiet", is_flag=True, expose_value=False,
+        callback=lambda ctx, _, value: ctx.meta.update({QUIET: value}),
         help="No progress and no notes on stderr; warnings and errors stay.",
     )  # fmt: skip
     return option(function)
-
-
-def _silence(ctx: click.Context, param: click.Parameter, value: bool) -> None:
-    ctx.meta[QUIET] = value
 
 
 def is_quiet() -> bool:
@@ -118,7 +115,11 @@ def laid_out(columns: Sequence[str], texts: Sequence[Sequence[str]], width: int 
     least = [max(len(word) for line in whole for word in [*line[i].split(), ""]) for i in range(len(columns))]
     room = None if width is None else width - GAP * (len(columns) - 1)
     if room is not None and sum(least) > room:
-        yield from _paragraphs(columns, texts, width or 0)
+        yield ", ".join(columns)
+        for line in texts:
+            yield ""
+            for heading, cell in zip(columns, line, strict=True):
+                yield from _wrapped(f"{heading}: {cell}", width or 0)
         return
     widths = natural if room is None else _narrowed(natural, least, room)
     for i, line in enumerate(whole):
@@ -140,14 +141,6 @@ def _narrowed(natural: Sequence[int], least: Sequence[int], room: int) -> list[i
 
 def _wrapped(text: str, width: int) -> list[str]:
     return wrap(text, width, break_long_words=False, break_on_hyphens=False)
-
-
-def _paragraphs(columns: Sequence[str], texts: Sequence[Sequence[str]], width: int) -> Iterator[str]:
-    yield ", ".join(columns)
-    for line in texts:
-        yield ""
-        for heading, cell in zip(columns, line, strict=True):
-            yield from _wrapped(f"{heading}: {cell}", width)
 
 
 @contextmanager

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -42,21 +41,17 @@ def command(name: str | None, as_json: bool) -> None:
     if as_json:
         emit_json(rows)
     else:
-        _list(rows)
+        for row in rows:
+            click.echo(f"{row['name']} ({row['distribution']} {row['version']})")
+            for kind, names in by_kind(row["provides"]).items():
+                click.echo(f"  {kind:<13} {', '.join(names)}")
+            if row["error"]:
+                click.echo(f"  error         {row['error']}")
         note("skillframe plugins NAME says what one is, and what can be set")
     for each in known.not_installed:
         click.echo(f"SKILLFRAME_PLUGINS names {each!r}, which is not installed", err=True)
     if known.unselected:
         click.echo(f"SKILLFRAME_PLUGINS leaves out {', '.join(known.unselected)}", err=True)
-
-
-def _list(rows: Sequence[dict[str, Any]]) -> None:
-    for row in rows:
-        click.echo(f"{row['name']} ({row['distribution']} {row['version']})")
-        for kind, names in by_kind(row["provides"]).items():
-            click.echo(f"  {kind:<13} {', '.join(names)}")
-        if row["error"]:
-            click.echo(f"  error         {row['error']}")
 
 
 def tell_record(name: str, as_json: bool) -> None:

@@ -13,10 +13,6 @@ from skillframe.cli.options import COUNT, SEED, WithUnit, robot_option, teachers
 from skillframe.cli.output import note, progress, warned
 from skillframe.config.units import Range
 
-_TURN = Range(-pi, pi, "half a turn to either side")
-_RATE = Range(0.01, 1e5, "as no controller here is faster")
-QUIET_S = 5.0  # shorter recordings need no progress
-
 
 @click.command(name="record")
 @world_option("World to demonstrate")
@@ -35,10 +31,14 @@ QUIET_S = 5.0  # shorter recordings need no progress
 @click.option("--seed", default=0, show_default=True, type=SEED, help="Everything random follows from it.")
 @click.option(
     "--angle",
-    type=WithUnit("deg", _TURN),
+    type=WithUnit("deg", Range(-pi, pi, "half a turn to either side")),
     help="Machines: push at this angle in their plane, -90 straight down [degrees].",
 )
-@click.option("--rate", type=WithUnit("Hz", _RATE), help="Sample rate [Hz]; default 500, machines 100.")
+@click.option(
+    "--rate",
+    type=WithUnit("Hz", Range(0.01, 1e5, "as no controller here is faster")),
+    help="Sample rate [Hz]; default 500, machines 100.",
+)
 @click.option(
     "--set",
     "settings",
@@ -82,7 +82,7 @@ def command(
 
     check_writable(out)
     machine = robot_of(robot)
-    with progress("s simulated", QUIET_S) as show, warned():
+    with progress("s simulated", after_s=5.0) as show, warned():
         recording = record(
             world, machine, teacher=teacher, count=count, seed=seed, set=dict(parse_setting(text) for text in settings),
             angle=None if angle is None else radians(angle), rate_hz=rate, progress=note,

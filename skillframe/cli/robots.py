@@ -40,6 +40,9 @@ def command(robot: str | None, check: bool, mass: str | None, no_meshes: bool, k
       skillframe robots panda
       skillframe robots my_robot.urdf --check --mass 33.5
     """
+    from skillframe.api.settings import of_robot
+    from skillframe.cli.output import emit_json
+    from skillframe.cli.settings import tell_keys
     from skillframe.errors import InputError
 
     for option, given in (("--mass", mass is not None), ("--no-meshes", no_meshes)):
@@ -50,7 +53,11 @@ def command(robot: str | None, check: bool, mass: str | None, no_meshes: bool, k
     if check and robot is None:
         raise InputError("--check", "checks one robot", "name it: skillframe robots my_robot.urdf --check")
     if keys:
-        _keys(as_json)
+        rows = list(of_robot())
+        if as_json:
+            emit_json(rows)
+        else:
+            tell_keys(rows)
     elif robot is None:
         _list(as_json)
     elif check:
@@ -58,18 +65,6 @@ def command(robot: str | None, check: bool, mass: str | None, no_meshes: bool, k
     else:
         _show(robot, as_json)
     return 0
-
-
-def _keys(as_json: bool) -> None:
-    from skillframe.api.settings import of_robot
-    from skillframe.cli.output import emit_json
-    from skillframe.cli.settings import tell_keys
-
-    rows = list(of_robot())
-    if as_json:
-        emit_json(rows)
-    else:
-        tell_keys(rows)
 
 
 def _list(as_json: bool) -> None:
@@ -91,27 +86,23 @@ def _list(as_json: bool) -> None:
         click.echo(f"{row['name']:<14} {row['error'] or row['summary']}")
 
 
-def _kilograms(mass: str) -> float:
-    """The total mass from kilograms or a kind of arm [kg]."""
-    from skillframe.robot.link_checks import class_mass
-
-    try:
-        return float(mass)
-    except ValueError:
-        return class_mass(mass)
-
-
 def _check(robot: str, mass: str | None, no_meshes: bool, as_json: bool) -> int:
-    from dataclasses import replace
+    from dataclasses import asdict, replace
 
     from skillframe.cli.output import note
     from skillframe.errors import SkillframeError
     from skillframe.extend.drives import audit
     from skillframe.robot.bodies import without_meshes
+    from skillframe.robot.link_checks import class_mass
     from skillframe.robot.model import load_model
     from skillframe.robot.spec import load_robot
 
-    total_kg = None if mass is None else _kilograms(mass)
+    total_kg = None
+    if mass is not None:
+        try:
+            total_kg = float(mass)
+        except ValueError:
+            total_kg = class_mass(mass)
     try:
         spec = load_robot(robot)
         model = load_model(spec)
@@ -125,11 +116,15 @@ def _check(robot: str, mass: str | None, no_meshes: bool, as_json: bool) -> int:
             result = replace(result, problems=(*result.problems, *collision_problems(model)))
     except SkillframeError as error:
         if as_json:
-            click.echo(json.dumps(_not_loaded(robot, str(error)), indent=2))
+            fix = "fix the file, then check again"
+            problem = {"code": "does_not_load", "severity": "fatal", "where": robot, "message": str(error), "fix": fix}
+            told = {"usable": False, "nq": None, "nv": None, "mass_kg": None, "problems": [problem]}
+            click.echo(json.dumps(told, indent=2))
         raise
     if as_json:
         own = {} if spec.control.interface == "torque" else {"interface": spec.control.figures()}
-        click.echo(json.dumps({**_plain(result), **own}, indent=2))
+        problems = [asdict(problem) for problem in result.problems]
+        click.echo(json.dumps({**asdict(result), "problems": problems, **own}, indent=2))
     else:
         _print_audit(robot, result, spec)
     return 0 if result.usable else 1
@@ -167,18 +162,6 @@ def _looks(what: str) -> bool:
         note(f"note: not checked: {what}: {error}")
         return False
     return True
-
-
-def _plain(result: Audit) -> dict[str, object]:
-    from dataclasses import asdict
-
-    return {**asdict(result), "problems": [asdict(p) for p in result.problems]}
-
-
-def _not_loaded(robot: str, message: str) -> dict[str, object]:
-    fix = "fix the file, then check again"
-    problem = {"code": "does_not_load", "severity": "fatal", "where": robot, "message": message, "fix": fix}
-    return {"usable": False, "nq": None, "nv": None, "mass_kg": None, "problems": [problem]}
 
 
 def _print_audit(robot: str, result: Audit, spec: RobotSpec) -> None:

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 FORCES = ("peak_force_filtered_n", "peak_force_10ms_n", "ended_by", "goal_reached", "ended_itself")
 APART = "distance_to_collision_m"
-QUIET_S = 5.0  # shorter runs need no progress
 
 
 class RunCommand(click.Command):
@@ -29,14 +28,23 @@ class RunCommand(click.Command):
         """The options of the core, with those of plug-ins behind `--out`."""
         params = super().get_params(ctx)
         behind = next(i for i, each in enumerate(params, start=1) if each.name == "out")
-        return [*params[:behind], *map(_option, _outputs()), *params[behind:]]
+        files = []
+        for record in _outputs():
+            kind = OutputFile(*record.endings) if record.endings else click.Path(path_type=Path)
+            files.append(click.Option([f"--{record.name}"], type=kind, help=f"{record.summary}."))
+        return [*params[:behind], *files, *params[behind:]]
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """As click does, but for an absent plug-in's option print what to install."""
         try:
             return super().parse_args(ctx, args)
         except click.NoSuchOption as error:
-            _refuse_output(error.option_name.lstrip("-"))
+            from skillframe.extend.homes import homes
+            from skillframe.extend.registry import registry
+
+            name = error.option_name.lstrip("-")
+            if f"output:{name}" in homes():
+                registry().output(name)
             raise
 
 
@@ -44,19 +52,6 @@ def _outputs() -> list[OutputType]:
     from skillframe.extend.registry import registry
 
     return [record for record in registry().records("output") if record.of == "run"]
-
-
-def _option(record: OutputType) -> click.Option:
-    kind = OutputFile(*record.endings) if record.endings else click.Path(path_type=Path)
-    return click.Option([f"--{record.name}"], type=kind, help=f"{record.summary}.")
-
-
-def _refuse_output(name: str) -> None:
-    from skillframe.extend.homes import homes
-    from skillframe.extend.registry import registry
-
-    if f"output:{name}" in homes():
-        registry().output(name)
 
 
 @click.command(name="run", cls=RunCommand)
@@ -123,7 +118,7 @@ def command(
         path = files[record.name]
         if path is not None and record.check is not None:
             record.check(path)
-    with progress("s simulated", QUIET_S) as show, warned():
+    with progress("s simulated", after_s=5.0) as show, warned():
         done = once(
             skill, world, robot, coc=coc, set=dict(parse_setting(text) for text in settings), seed=seed,
             duration_s=duration, rate_hz=rate, scores=scores,

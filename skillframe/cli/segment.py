@@ -78,7 +78,9 @@ def command(
     policy.save(out)
     count = len(policy.phases)
     made = f"{out}: {count} phase{'s' * (count != 1)} from {len(files)} demonstration{'s' * (len(files) != 1)}"
-    one = [ONE_FOUND] if count == 1 and phases is None and not _pushes(policy.phases[0]) else []
+    parts = (part for phase in policy.phases for part in phase.values() if isinstance(part, dict))
+    pushes = any(part.get("desired_direction") for part in parts)
+    one = [ONE_FOUND] if count == 1 and phases is None and not pushes else []
     tell([made, *policy.words, *one])
     if page is not None:
         from skillframe.extend.outputs import Segmentation, no_progress
@@ -87,12 +89,6 @@ def command(
         registry().output("boundaries").write(cut, page, no_progress)
         click.echo(f"{page}: open it in a browser, drag a boundary, and run the line that it says")
     return 0
-
-
-def _pushes(phase: dict[str, Any]) -> bool:
-    return any(
-        part["desired_direction"] for part in phase.values() if isinstance(part, dict) and "desired_direction" in part
-    )
 
 
 def _line() -> str:

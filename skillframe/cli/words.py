@@ -10,7 +10,6 @@ from collections.abc import Iterable, Iterator
 
 import click
 
-WIDTH = 100
 PHASE = re.compile(r"(phase \d+): ")
 LABEL = re.compile(r"[a-z][a-z ]{0,15}: ")
 OUTSIDE = re.compile(r"; (?![^(]*\))")
@@ -30,15 +29,11 @@ def laid_out(lines: Iterable[str]) -> Iterator[str]:
         if found is not None and found[1] != heading:
             yield found[1]
         heading = "" if found is None else found[1]
-        yield from _broken(line if found is None else line[found.end() :], "" if found is None else "  ")
-
-
-def _broken(line: str, margin: str) -> Iterator[str]:
-    label = LABEL.match(line)
-    phrases = OUTSIDE.split(line)
-    if label is None or len(phrases) == 1 or len(margin + line) <= WIDTH:
-        yield margin + line
-        return
-    first, *rest = phrases
-    texts = [margin + first, *(margin + " " * label.end() + part for part in rest)]
-    yield from [*(f"{text};" for text in texts[:-1]), texts[-1]]
+        line, margin = (line, "") if found is None else (line[found.end() :], "  ")
+        label = LABEL.match(line)
+        first, *rest = OUTSIDE.split(line)
+        if label is None or not rest or len(margin + line) <= 100:  # columns
+            yield margin + line
+        else:
+            texts = [margin + first, *(margin + " " * label.end() + part for part in rest)]
+            yield from [*(f"{text};" for text in texts[:-1]), texts[-1]]

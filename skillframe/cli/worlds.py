@@ -38,40 +38,36 @@ def command(world: str | None, settings: bool, pictures: Path | None, as_json: b
       skillframe worlds --pictures worlds
       skillframe worlds parts/fixture.toml --pictures parts
     """
+    from skillframe.api.settings import of_trials, settings_of_world
+    from skillframe.cli.catalog import rows_of
+    from skillframe.extend.outputs import no_progress
+    from skillframe.extend.records import make_scene
+    from skillframe.extend.registry import registry
+
     if pictures is not None and settings:
         raise InputError("--pictures", "draws worlds, and --settings lists their settings", "give one of the two")
     if pictures is not None:
-        _draw(world, pictures)
+        draw = registry().output("scene").write
+        chosen = registry().records("world") if world is None else [registry().world(world)]
+        pictures.mkdir(parents=True, exist_ok=True)
+        for record in chosen:
+            draw(make_scene(record, {}), pictures / f"{Path(record.name).stem}.png", no_progress)
     if settings:
-        rows = _settings(world)
+        chosen = [registry().world(world)] if world is not None else registry().records("world")
+        rows = [*of_trials(), *(row for record in chosen for row in settings_of_world(record))]
         if as_json:
             emit_json(rows)
         else:
             tell_settings(rows)
     elif world is None:
-        _list(as_json)
+        rows = rows_of(registry(), "world")
+        if as_json:
+            emit_json(rows)
+        else:
+            lines = [(row["name"], row["summary"], row["distribution"]) for row in rows]
+            table(("world", "what it is", "from"), lines, LIST_WIDTH)
     else:
         _show(world, as_json)
-
-
-def _list(as_json: bool) -> None:
-    from skillframe.cli.catalog import rows_of
-    from skillframe.extend.registry import registry
-
-    rows = rows_of(registry(), "world")
-    if as_json:
-        emit_json(rows)
-    else:
-        lines = [(row["name"], row["summary"], row["distribution"]) for row in rows]
-        table(("world", "what it is", "from"), lines, LIST_WIDTH)
-
-
-def _settings(world: str | None) -> list[dict[str, Any]]:
-    from skillframe.api.settings import of_trials, settings_of_world
-    from skillframe.extend.registry import registry
-
-    worlds = [registry().world(world)] if world is not None else list(registry().records("world"))
-    return [*of_trials(), *(row for record in worlds for row in settings_of_world(record))]
 
 
 def _show(world: str, as_json: bool) -> None:
@@ -111,15 +107,3 @@ def _show(world: str, as_json: bool) -> None:
 
 def _point(point: tuple[float, ...]) -> str:
     return ", ".join(f"{1000.0 * each:g}" for each in point)
-
-
-def _draw(world: str | None, folder: Path) -> None:
-    from skillframe.extend.outputs import no_progress
-    from skillframe.extend.records import make_scene
-    from skillframe.extend.registry import registry
-
-    draw = registry().output("scene").write
-    records = registry().records("world") if world is None else [registry().world(world)]
-    folder.mkdir(parents=True, exist_ok=True)
-    for record in records:
-        draw(make_scene(record, {}), folder / f"{Path(record.name).stem}.png", no_progress)

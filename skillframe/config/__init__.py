@@ -92,9 +92,11 @@ def build(cls: type[_T], values: Mapping[str, Any], where: str) -> _T:
     for key in values:
         if key not in fields:
             raise InputError(where, str(UnknownName("key", str(key), fields)))
-    ready = {
-        key: _value(value, hints[key], said.get(key, ""), f"{where}.{key}") for key, value in values.items()
-    }  # fmt: skip
+    ready = {}
+    for key, value in values.items():
+        about, place = said.get(key, ""), f"{where}.{key}"
+        ready[key] = coerce(in_si(value, hints[key], unit_of(about), place), hints[key], place)
+        require_within(value, ready[key], unit_of(about), range_of(about), place)
     missing = [
         n
         for n, f in fields.items()
@@ -110,12 +112,6 @@ def _hints(cls: type) -> Mapping[str, Any]:
     return typing.get_type_hints(cls)
 
 
-def _value(value: Any, hint: Any, about: str, where: str) -> Any:
-    ready = coerce(in_si(value, hint, unit_of(about), where), hint, where)
-    require_within(value, ready, unit_of(about), range_of(about), where)
-    return ready
-
-
 def in_si(value: Any, hint: Any, unit: str, where: str) -> Any:
     """Convert texts with units ("8mm") to SI where numbers are expected, also in lists and tables.
 
@@ -126,18 +122,15 @@ def in_si(value: Any, hint: Any, unit: str, where: str) -> Any:
         return {key: in_si(inner, typing.get_args(hint)[1], unit, f"{where}.{key}") for key, inner in value.items()}
     if isinstance(value, list | tuple) and not isinstance(hint, type):
         return [in_si(inner, _inner(hint, i), unit, f"{where}[{i}]") for i, inner in enumerate(value)]
-    return si(value, unit, where) if isinstance(value, str) and _numeric(hint) else value
+    kinds = (hint, *typing.get_args(hint))
+    numeric = str not in kinds and (float in kinds or int in kinds)
+    return si(value, unit, where) if isinstance(value, str) and numeric else value
 
 
 def _inner(hint: Any, index: int) -> Any:
     options = [h for h in (hint, *typing.get_args(hint)) if typing.get_origin(h) in (list, tuple)]
     args = typing.get_args(options[0]) if options else ()
     return args[min(index, len(args) - 1)] if args and args[-1] is not Ellipsis else args[0] if args else Any
-
-
-def _numeric(hint: Any) -> bool:
-    kinds = (hint, *typing.get_args(hint))
-    return str not in kinds and (float in kinds or int in kinds)
 
 
 WORDS = {float: "a number", int: "a whole number", str: "text", bool: "true or false", Path: "a path"}

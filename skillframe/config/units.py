@@ -105,20 +105,16 @@ def si(value: Any, unit: str, where: str) -> Any:
     if typed is None or typed.unit not in unit.split(" or "):
         asked = f"a quantity in {unit}" if unit else "a number without a unit"
         unknown = f", and {found[2]!r} is no unit that is known" if typed is None else ""
-        raise InputError(where, f"expected {asked}, got {value.strip()}{unknown}", _words_for(unit))
+        words = [word for each in unit.split(" or ") for word in _FACTORS.get(each, ())]
+        fix = f"give the number alone, in {unit}" if unit else "leave the unit out"
+        fix = f"give it with one of the units {', '.join(words)}" if words else fix
+        raise InputError(where, f"expected {asked}, got {value.strip()}{unknown}", fix)
     return typed.value
 
 
 def one_of(unit: str, slides: bool) -> str:
     """Select from "rad or m" by whether the joint is prismatic."""
     return unit.split(" or ")[-1 if slides else 0]
-
-
-def _words_for(unit: str) -> str:
-    words = [word for each in unit.split(" or ") for word in _FACTORS.get(each, ())]
-    if not words:
-        return f"give the number alone, in {unit}" if unit else "leave the unit out"
-    return f"give it with one of the units {', '.join(words)}"
 
 
 def doubt(key: str, value: Any, unit: str, default: Any) -> str:

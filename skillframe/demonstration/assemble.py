@@ -225,7 +225,13 @@ def join(pose: Columns, wrench: Columns, options: ReadOptions, notes: list[str])
     joined = {**{k: v for k, v in first.items() if k not in WRENCH}, **second, "t": time}
     text = f"pose at {_rate(pose):.4g} Hz and wrench at {_rate(wrench):.4g} Hz were joined on the clock of the "
     notes.append(text + ("pose" if keep_pose else "wrench"))
-    notes += [*_left_out(pose, "pose", time, options), *_left_out(wrench, "wrench", time, options), *_gaps(other, time)]
+    notes += [*_left_out(pose, "pose", time, options), *_left_out(wrench, "wrench", time, options)]
+    step = np.diff(other["t"])
+    wide = np.flatnonzero(step > GAP * np.median(step))
+    wide = wide[(other["t"][wide + 1] > time[0]) & (other["t"][wide] < time[-1])]
+    if wide.size:
+        text = f"{wide.size} gaps of up to {step[wide].max():.3g} s in {other.source} were bridged by interpolation"
+        notes.append(text)
     return kept.where(inside).with_values(joined)
 
 
@@ -245,15 +251,6 @@ def _left_out(columns: Columns, name: str, time: Float, options: ReadOptions) ->
     return [
         f"{lost:.3g} of the {clock[-1] - clock[0]:.3g} s of the {name} were left out: the other file lasts no longer"
     ]
-
-
-def _gaps(other: Columns, time: Float) -> list[str]:
-    step = np.diff(other["t"])
-    wide = np.flatnonzero(step > GAP * np.median(step))
-    wide = wide[(other["t"][wide + 1] > time[0]) & (other["t"][wide] < time[-1])]
-    if not wide.size:
-        return []
-    return [f"{wide.size} gaps of up to {step[wide].max():.3g} s in {other.source} were bridged by interpolation"]
 
 
 def interpolate(columns: Columns, time: Float) -> dict[str, Float]:

@@ -22,13 +22,11 @@ from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from skillframe.demonstration.columns import ALIASES, FORCE, KNOWN, POSITION, QUATERNION, WRENCH, Columns
 from skillframe.errors import InputError
 from skillframe.frames import Float, matrix_from_quaternion, norm, rotate, rotation_vector
 
-NEIGHBOURS = 3
 GAP = 3.0
 """A step of the clock longer than this many medians is a gap, and not judged as one sample."""
 
@@ -173,7 +171,7 @@ def _lone(rotation: Float, time: Float) -> tuple[int, float] | None:
     angle = angles_between(rotation)
     speed = angle / step
     for i in np.flatnonzero((angle > np.deg2rad(20.0)) & (step < GAP * np.median(step))):
-        near = np.r_[speed[max(0, i - NEIGHBOURS) : i], speed[i + 1 : i + 1 + NEIGHBOURS]]
+        near = np.r_[speed[max(0, i - 3) : i], speed[i + 1 : i + 4]]
         if near.size and speed[i] > 10.0 * near.max():
             return int(i) + 1, float(angle[i])
     return None
@@ -191,14 +189,12 @@ def refuse_dead_wrench(columns: Columns, meta: Mapping[str, Any]) -> None:
     )  # fmt: skip
 
 
-SAMPLES = 400
 SHARES = (0.25, 0.5, 0.75, 1.0)  #: parts of a recording that are compared with the whole
 LEAST_TURN = np.deg2rad(20.0)  #: of the tool, for its weight to show [rad]
 LEAST_RESIDUAL, RESIDUAL_RATIO = 0.5, 5.0  #: of a fit of weight and bias [N], and to that of another convention
 LEAST_PATH, WORK_COSINE = 0.02, 0.3  #: in contact [m], and cosine of force and motion: friction brakes
 LEAST_WEIGHT, MOST_WEIGHT = 2.0, 981.0
 """Range of a tool's weight if none is declared [N]; more than 100 kg is a force, or another unit."""
-LEVEL_TIME = 0.25
 
 
 class Turning(NamedTuple):
@@ -256,7 +252,11 @@ def fit_weight_and_bias(force: Float, rotation: Float, frame: str) -> tuple[Floa
 
 def weight_evidence(force: Float, rotation: Float, frame: str, weighs: bool = False) -> str | None:
     """Evidence that forces (T, 3), declared to be in these axes, are in the others, or None."""
-    pick = _while_turning(rotation)
+    pick = np.linspace(0, len(rotation) - 1, min(400, len(rotation))).round().astype(int)
+    steps = norm(rotation_vector(np.swapaxes(rotation[pick[:-1]], -1, -2) @ rotation[pick[1:]]))
+    turned = np.concatenate([[0.0], np.cumsum(steps)])
+    # at even steps of rotation, as standing still shows no frame
+    pick = pick[np.searchsorted(turned, np.linspace(0.0, turned[-1], len(pick)), side="right") - 1]
     force, rotation = force[pick], rotation[pick]
     other = "tool" if frame == "base" else "base"
     for share in SHARES:
@@ -275,14 +275,6 @@ def weight_evidence(force: Float, rotation: Float, frame: str, weighs: bool = Fa
         if weighs and (evidence := _still_weight(force[part], rotation[part], frame)) is not None:
             return evidence
     return None
-
-
-def _while_turning(rotation: Float) -> NDArray[np.intp]:
-    """Indices of orientations (T, 3, 3) at even steps of rotation. Standing still shows no frame."""
-    pick = np.linspace(0, len(rotation) - 1, min(SAMPLES, len(rotation))).round().astype(int)
-    steps = norm(rotation_vector(np.swapaxes(rotation[pick[:-1]], -1, -2) @ rotation[pick[1:]]))
-    turned = np.concatenate([[0.0], np.cumsum(steps)])
-    return pick[np.searchsorted(turned, np.linspace(0.0, turned[-1], len(pick)), side="right") - 1]
 
 
 def _still_weight(force: Float, rotation: Float, frame: str) -> str | None:
@@ -325,7 +317,7 @@ def work_cosine(position: Float, force: Float, time: Float, turning: Turning | N
 
 def _work_evidence(position: Float, force: Float, rotation: Float, time: Float, frame: str) -> str | None:
     evidence = None
-    for level in (force[time <= time[0] + LEVEL_TIME].mean(axis=0), np.zeros(3)):
+    for level in (force[time <= time[0] + 0.25].mean(axis=0), np.zeros(3)):
         turned = rotate(rotation, force - level)
         in_base, wrong = (force - level, turned) if frame == "base" else (turned, force - level)
         ours, path = work_cosine(position, in_base, time)

@@ -30,7 +30,7 @@ from skillframe.demonstration.stalls import Stall, stalls
 from skillframe.errors import InputError
 from skillframe.frames import Float, norm
 
-SIGMAS, SHARE = 6.0, 0.1
+SIGMAS = 6.0
 HOLD, LEVEL_TIME = 0.05, 0.25  #: least duration of a contact, and of free air before it [s]
 
 
@@ -95,7 +95,7 @@ def _scatter(noise: NoiseFigures) -> float:
 
 
 def _least(strength: Float) -> float:
-    return max(1.0, SHARE * float(np.quantile(strength, 0.99)))
+    return max(1.0, 0.1 * float(np.quantile(strength, 0.99)))
 
 
 def contact_strength(
@@ -141,9 +141,10 @@ def contact_intervals(
     """Intervals in contact, in order. Arguments as `contact_strength`."""
     strength, threshold = contact_strength(time, wrench, noise, level, alive)
     touching = strength > 0.5 * threshold
-    pieces = _runs(touching if alive is None else touching & alive)
+    touching = touching if alive is None else touching & alive
+    edges = np.flatnonzero(np.diff(np.r_[False, touching, False].astype(np.int8))).reshape(-1, 2)
     merged: list[tuple[int, int]] = []
-    for first, last in pieces:
+    for first, last in ((int(a), int(b) - 1) for a, b in edges):
         if merged and time[first] - time[merged[-1][1]] < HOLD:
             merged[-1] = (merged[-1][0], last)
         else:
@@ -167,11 +168,6 @@ def _lasts(time: Float, force: Float, bound: float) -> bool:
         force = (total[width:] - total[:-width]) / width if len(force) >= width else force
         bound *= float(np.sinc(0.5 * width / count))
     return float(norm(force).max()) > bound
-
-
-def _runs(mask: np.ndarray[tuple[int], np.dtype[np.bool_]]) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.r_[False, mask, False].astype(np.int8)))
-    return [(int(a), int(b) - 1) for a, b in edges.reshape(-1, 2)]
 
 
 WINDOW, LEAST_SAMPLES = 0.25, 10  #: of a noise figure: stretch [s] and samples

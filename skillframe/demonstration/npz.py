@@ -53,7 +53,7 @@ def _meta(path: Path, arrays: dict[str, Any]) -> dict[str, Any]:
             "name its arrays with --set columns (--layout auto proposes them), or store a JSON text meta with format "
             f"{FORMAT!r}",
         )
-    meta = json_member(path, arrays, "meta", "store one JSON text")
+    meta = json_member(path, arrays, "store one JSON text")
     if meta is None:
         raise InputError(f"{path}: meta", "is not a JSON object", "store one JSON text")
     form, version = meta.pop("format", None), meta.pop("version", None)

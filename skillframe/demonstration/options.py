@@ -221,8 +221,9 @@ def check_meta(source: str, meta: Mapping[str, Any]) -> None:
     Raises:
         InputError: a wrong type or an unknown choice; names the key.
     """
-    if meta.get("teacher") is not None and meta["teacher"] not in (*TEACHERS, ""):
-        _warn_free_choice(source, "teacher", meta["teacher"])
+    teacher = meta.get("teacher")
+    if teacher is not None and not isinstance(teacher, str):  # words other than those of the contract are accepted
+        raise InputError(f"{source}: teacher", str(UnknownName("value", str(teacher), TEACHERS)))
     for key, kind, words in (
         ("frames", Mapping, "a table"),
         ("sensor", Mapping, "a table"),
@@ -244,12 +245,6 @@ def check_meta(source: str, meta: Mapping[str, Any]) -> None:
             raise InputError(
                 f"{source}: sensor.{name}", f"is no standard deviation: {value!r}", "give N or Nm, 0 or above"
             )
-
-
-def _warn_free_choice(source: str, key: str, value: object) -> None:
-    """Accept other words than those of the contract, and refuse other types."""
-    if not isinstance(value, str):
-        raise InputError(f"{source}: {key}", str(UnknownName("value", str(value), TEACHERS)))
 
 
 def point_of(point: Any, where: str) -> list[float]:

@@ -28,8 +28,6 @@ from numpy.typing import NDArray
 from skillframe.errors import InputError
 from skillframe.frames import Float
 
-MOST_ABOVE = 40
-"""Rows searched for a header; motion capture writes 7 above it, data loggers about 25."""
 BEGINS = re.compile(r'[\s"]*[-+]?[.,]?\d')
 CONTROL = [chr(code) for code in range(32) if chr(code) not in "\t\n\r\f\v"]
 """Characters that no table holds, but nearly all binary files."""
@@ -158,7 +156,8 @@ def _is_data(line: str, delimiter: str | None) -> bool:
 
 def _preamble(lines: list[tuple[int, str]], delimiter: str | None) -> int:
     """Number of rows above a header, which are shorter: version, name, or groups of columns."""
-    counts = [len(_split(line, delimiter)) for _, line in lines[: MOST_ABOVE + 2]]
+    # 40 rows are searched: motion capture writes 7 above the header, data loggers about 25
+    counts = [len(_split(line, delimiter)) for _, line in lines[:42]]
     first = counts.index(counts[-1])
     header = not _is_data(lines[first][1], delimiter) and set(counts[first:]) == {counts[-1]}
     more = header and len(counts) > first + 1

@@ -33,8 +33,6 @@ from skillframe.extend.records import Document
 from skillframe.frames import Float
 
 DIRECTIONS = ("x", "y", "z")
-WIDE_OPEN = {"translation": 0.1, "rotation": 0.5}  # crisp's defaults, on axes without stiffness [m, rad]
-CRISP_LARGEST = 5000.0  # crisp's limit of stiffness and damping
 
 
 CRISP = (
@@ -64,14 +62,15 @@ def crisp(phase: MovingImpedance, lines: Sequence[str]) -> str:
     for part, short, prefix, lead, at in _parts(phase):
         k, d = _gains(phase, at)
         values = np.concatenate([k, d])
-        if values.max() > CRISP_LARGEST:
+        if values.max() > 5000.0:  # crisp's limit of stiffness and damping
             raise InputError(
                 f"skill: {part}", f"holds a stiffness or damping of {values.max():g}, and crisp_controllers takes "
-                f"{CRISP_LARGEST:g} at most", "learn with a smaller --set stiffness_n_m or stiffness_nm_rad",
+                "5000 at most", "learn with a smaller --set stiffness_n_m or stiffness_nm_rad",
             )  # fmt: skip
         for axis, stiffness, damping in zip(DIRECTIONS, k.tolist(), d.tolist(), strict=True):
             task[f"k_{short}_{axis}"], task[f"d_{short}_{axis}"] = stiffness, damping
-            clip[prefix + axis] = lead / stiffness if stiffness > 0.0 else WIDE_OPEN[part]
+            open_ = 0.1 if part == "translation" else 0.5  # crisp's defaults [m, rad]
+            clip[prefix + axis] = lead / stiffness if stiffness > 0.0 else open_
     fixed = {"use_operational_space": False, "use_local_jacobian": False, "limit_error": True}
     body = {"cartesian_controller": {"ros__parameters": {**fixed, "task": {**task, "error_clip": clip}}}}
     return yaml_text([*lines, *CRISP], body)
@@ -156,7 +155,7 @@ def _gains(phase: MovingImpedance, at: int) -> tuple[Float, Float]:
     """Stiffness and damping per axis (3,)."""
     block = slice(at, at + 3)
     stiffness, off = per_axis(phase.stiffness[block, block])
-    if off > MOST_OFF:
+    if off > np.deg2rad(15.0):  # the compliant axis would be that of another skill
         raise InputError(
             "skill", f"its compliant axes are {np.rad2deg(off):.0f} degrees from the controller's ({phase.axes}) axes",
             "export aic_motion_update, which holds whole matrices, or learn with other --axes",
@@ -195,7 +194,6 @@ def _scalar(value: Any) -> str:
 
 
 PARTS = ("translation", "rotation")
-MOST_OFF = np.deg2rad(15.0)  # a compliant axis farther off would be another skill
 
 
 def moving_impedance(

@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from skillframe import __version__
-from skillframe.config import parse_setting
+from skillframe.config import LARGEST, parse_setting
 from skillframe.demonstration.record import Demonstration
 from skillframe.document.frame import demand, read_frame, refuse_unfit
 from skillframe.errors import InputError, UnknownName
@@ -36,7 +36,6 @@ from skillframe.extend.registry import registry
 from skillframe.files import write_whole
 from skillframe.files.documents import check_plain, parse_json, read_text, refuse_other, shown
 
-LARGEST = 1e100  # beyond it squares overflow
 FORMAT, VERSION = "skillframe.skill", 1
 _KINDS = {
     "format": str, "version": int, "type": str, "created_by": dict, "learned_from": list,
@@ -316,16 +315,11 @@ def load_skill(text: str, folder: Path | None = None) -> tuple[str, Document]:
         InputError: a file cannot be used, or no demonstration is given.
         UnknownName: no such kind of skill.
     """
-    from skillframe.document.file import load
+    from skillframe.extend.reading import read_demonstration
 
     source, base = parse_source(text, folder), folder or Path()
-    return source.name, _learn(source, base) if source.kind else load(base / source.files[0])
-
-
-def _learn(source: SkillSource, base: Path) -> Document:
-    from skillframe.extend.reading import read_demonstration
-    from skillframe.extend.registry import registry
-
+    if not source.kind:
+        return source.name, load(base / source.files[0])
     skill = registry().skill(source.kind)
-    settings: dict[str, Any] = dict(parse_setting(part) for part in source.settings)
-    return learned(skill, [read_demonstration(base / file) for file in source.files], LearnOptions(settings=settings))
+    options = LearnOptions(settings=dict(parse_setting(part) for part in source.settings))
+    return source.name, learned(skill, [read_demonstration(base / file) for file in source.files], options)

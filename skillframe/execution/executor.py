@@ -32,8 +32,6 @@ from skillframe.world.plant import START_DEPTH, Plant
 __all__ = ["Loop", "Result", "Setup", "begin", "simulate"]
 
 RAMP_S = 0.05  #: duration of the ramp of stiffness at the start [s]
-APART_TICKS = 100
-"""Ticks between two distance measurements of bodies that must not touch; one costs about as much as a tick."""
 
 
 def simulate(
@@ -161,7 +159,7 @@ class Loop:
 
     def _stop_where_due(self, tick: int, time: float, command: Command) -> None:
         slow, ending = tick % SLOW_TICKS == 0, np.count_nonzero(command.status)
-        if tick % APART_TICKS == 0:
+        if tick % 100 == 0:  # how far bodies are apart costs about as much as a tick
             self.collisions.measure(self.plant, self.active)
         self._end_broken([Broken(row, Ended.COMMAND, cause) for row, cause in self.faults], time)
         broken = self.drive.violations(tick, self.active)

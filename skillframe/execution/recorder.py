@@ -60,7 +60,7 @@ def geom_json(geom: Geom) -> dict[str, Any]:
     return result
 
 
-CAPACITY, FIRST = 20_000, 1000  # samples per trial: at most, and before the arrays first grow
+FIRST = 1000  # samples per trial before the arrays first grow
 
 
 class Recorder:
@@ -70,7 +70,7 @@ class Recorder:
     """
 
     def __init__(
-        self, plant: Plant, every: int, point: Float, capacity: int = CAPACITY,
+        self, plant: Plant, every: int, point: Float, capacity: int = 20_000,
         machine: Mapping[str, tuple[int, ...]] | None = None,
     ) -> None:  # fmt: skip
         self._plant, self._every, self._point, self._capacity = plant, every, point, capacity

@@ -128,7 +128,8 @@ def peak_forces(values: Mapping[str, object], figure: Callable[[float], str]) ->
         values: by column.
         figure: writes a number.
     """
-    known = {column: value for column in WORDS if (value := _finite(values.get(column))) is not None}
+    given = {column: values.get(column) for column in WORDS}
+    known = {name: float(x) for name, x in given.items() if isinstance(x, int | float) and math.isfinite(x)}
     where = force_source(values)
     return [f"{WORDS[column].replace(SIMULATED, where)} {figure(value)} N" for column, value in known.items()]
 
@@ -136,11 +137,6 @@ def peak_forces(values: Mapping[str, object], figure: Callable[[float], str]) ->
 def force_source(values: Mapping[str, object]) -> str:
     """Where the unfiltered contact force of a run comes from: the simulator, or a real robot's sensor."""
     return "at the sensor" if values.get("source") == "real" else SIMULATED
-
-
-def _finite(value: object) -> float | None:
-    """A finite number, or None."""
-    return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
 
 
 def joint_shares(meta: Mapping[str, Any]) -> list[str]:

@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from skillframe.config import LARGEST
 from skillframe.errors import InputError, SkillframeError
 from skillframe.extend.outputs import ScoreType
 from skillframe.extend.registry import registry
@@ -115,7 +116,7 @@ class Trace:
             InputError: missing, not a trace, or of a newer version.
         """
         arrays = read_arrays(path, "trace file", GIVE)
-        meta = json_member(path, arrays, "meta", GIVE) if "meta" in arrays else None
+        meta = json_member(path, arrays, GIVE) if "meta" in arrays else None
         if meta is None:
             raise InputError(path, "is not a readable trace file, or is damaged (it holds no JSON object meta)", GIVE)
         del arrays["meta"]
@@ -162,7 +163,6 @@ def _check_numbers(path: Path, arrays: dict[str, Float]) -> None:
 SHARES = ("peak_torque_share", "peak_speed_share", "peak_range_share")  #: columns of the largest share of the limits
 SHARE_JOINTS = ("peak_torque_joint", "peak_speed_joint", "peak_range_joint")
 """Names of the joints' largest shares of their limits, and of the joints."""
-LARGEST = 1e100  # larger values overflow when squared
 KINDS: dict[str, type | tuple[type, ...]] = {
     **dict.fromkeys(
         ("analytic", "draws", "frames", "interface", "limits", "params", "progress", "scores", "second"), dict
@@ -235,11 +235,9 @@ def _check_geom(path: Path, where: str, geom: Mapping[str, Any]) -> None:
             _refuse(path, f"{where}.{key}", value)
     if geom.get("quaternion") is not None and not any(geom["quaternion"]):
         _refuse(path, f"{where}.quaternion", geom["quaternion"])
-    if kind == "mesh":
-        _check_mesh(path, where, geom.get("vertices"), geom.get("faces"))
-
-
-def _check_mesh(path: Path, where: str, vertices: object, faces: object) -> None:
+    if kind != "mesh":
+        return
+    vertices, faces = geom.get("vertices"), geom.get("faces")
     if not isinstance(vertices, list) or not all(_are_numbers(vertex, 3, 3) for vertex in vertices):
         raise InputError(f"{path}: meta.{where}.vertices", "are no points of three finite numbers [m]", CURE)
     if not isinstance(faces, list) or not all(

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
 from contextlib import redirect_stdout
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -117,22 +116,15 @@ class PluginCommand:
 def plugin_commands() -> dict[str, PluginCommand]:
     """Commands of all installed distributions, by name in alphabetical order, without importing them."""
     found: dict[str, PluginCommand] = {}
-    for command in _declared():
-        other = found.get(command.name)
-        if other is not None and other.selected == command.selected:
-            rivals = (*other.distributions, *command.distributions)
-            found[command.name] = PluginCommand(other.name, rivals, other.version, other.selected, "")
-        elif other is None or command.selected:
-            found[command.name] = command
-    return {name: found[name] for name in sorted(found)}
-
-
-def _declared() -> Iterator[PluginCommand]:
+    setting = os.environ.get("SKILLFRAME_PLUGINS")
     for distribution, version, points in declaring(GROUP):
-        setting = os.environ.get("SKILLFRAME_PLUGINS")
         selected = setting is None or any(
             group == PLUGINS and name in {each.strip() for each in setting.split(",")} for group, name, _ in points
         )
-        for group, name, place in points:
-            if group == GROUP:
-                yield PluginCommand(name, (distribution,), version, selected, place)
+        for name, place in ((name, place) for group, name, place in points if group == GROUP):
+            other = found.get(name)
+            if other is not None and other.selected == selected:
+                found[name] = PluginCommand(name, (*other.distributions, distribution), other.version, selected, "")
+            elif other is None or selected:
+                found[name] = PluginCommand(name, (distribution,), version, selected, place)
+    return {name: found[name] for name in sorted(found)}

@@ -38,7 +38,8 @@ def declaring(group: str) -> Iterator[Declared]:
         text = read("entry_points.txt") or ""
         if f"[{group}]" not in text or not any(line.strip() == f"[{group}]" for line in text.splitlines()):
             continue
-        head = _head(read("METADATA") or read("PKG-INFO") or "")
+        fields = (read("METADATA") or read("PKG-INFO") or "").partition("\n\n")[0].splitlines()
+        head = {key.strip().lower(): value.strip() for key, _, value in (line.partition(":") for line in fields)}
         name = head.get("name", "")
         if name and name.lower() not in seen:
             seen.add(name.lower())
@@ -47,21 +48,17 @@ def declaring(group: str) -> Iterator[Declared]:
 
 def _distributions() -> Iterator[Read]:
     path = search_path()
-    if all(map(_is_plain, path)) and not any(map(_finds_distributions, sys.meta_path)):
+    plain = all(
+        (os.path.isdir(place or os.curdir) and not place.endswith(".egg")) or not os.path.exists(place)
+        for place in path
+    )
+    if plain and not any(each is not PathFinder and hasattr(each, "find_distributions") for each in sys.meta_path):
         for place in path:
             yield from _in_folder(place or os.curdir)
         return
     from importlib.metadata import distributions
 
     yield from (each.read_text for each in distributions(path=list(path)))
-
-
-def _is_plain(place: str) -> bool:
-    return (os.path.isdir(place or os.curdir) and not place.endswith(".egg")) or not os.path.exists(place)
-
-
-def _finds_distributions(finder: object) -> bool:
-    return finder is not PathFinder and hasattr(finder, "find_distributions")
 
 
 def _in_folder(place: str) -> Iterator[Read]:
@@ -80,12 +77,6 @@ def _reader(folder: str) -> Read:
             return None
 
     return read
-
-
-def _head(text: str) -> dict[str, str]:
-    """The fields of a metadata file by lower-case name, up to its first empty line."""
-    lines = (line.partition(":") for line in text.partition("\n\n")[0].splitlines())
-    return {key.strip().lower(): value.strip() for key, _, value in lines}
 
 
 def _points(text: str) -> Iterator[EntryPoint]:

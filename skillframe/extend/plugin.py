@@ -9,7 +9,7 @@ import os
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from importlib.metadata import Distribution, EntryPoint, distributions
+from importlib.metadata import Distribution, distributions
 from typing import Any
 
 from skillframe.errors import SkillframeError, UnknownName
@@ -135,10 +135,12 @@ def installed() -> list[tuple[Plugin, Callable[[], object]]]:
         if name.lower() in seen:  # the first on the path is the one that imports
             continue
         seen.add(name.lower())
+        try:
+            requires = tuple(distribution.requires or ())
+        except Exception:  # damaged, which `_entries` reports
+            requires = ()
         for entry, load in _entries(distribution, name):
-            found[entry, name] = (
-                Plugin(name=entry, distribution=name, version=version, requires=_requires(distribution)), load,
-            )  # fmt: skip
+            found[entry, name] = Plugin(name=entry, distribution=name, version=version, requires=requires), load
     return [found[key] for key in sorted(found)]
 
 
@@ -153,27 +155,14 @@ def _identity(distribution: Distribution) -> tuple[str, str]:
     return str(name or stem), str(version or rest or "?")
 
 
-def _requires(distribution: Distribution) -> tuple[str, ...]:
-    try:
-        return tuple(distribution.requires or ())
-    except Exception:  # as above; `_entries` reports the damage
-        return ()
-
-
 def _entries(distribution: Distribution, name: str) -> list[tuple[str, Callable[[], object]]]:
     try:
         points = [point for point in distribution.entry_points if point.group == GROUP]
     except Exception as error:  # a damaged entry_points.txt
-        return [(name, _raiser(BadPlugin(f"entry_points.txt of {name} cannot be read ({error}); install it again")))]
-    return [(point.name, _loader(point)) for point in points]
+        damage = BadPlugin(f"entry_points.txt of {name} cannot be read ({error}); install it again")
 
+        def load() -> object:
+            raise damage
 
-def _loader(point: EntryPoint) -> Callable[[], object]:
-    return lambda: point.load()
-
-
-def _raiser(error: Exception) -> Callable[[], object]:
-    def load() -> object:
-        raise error
-
-    return load
+        return [(name, load)]
+    return [(point.name, point.load) for point in points]

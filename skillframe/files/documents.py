@@ -231,7 +231,6 @@ def refuse_bomb(path: Path | str, packed: int, unpacked: int, fix: str, most: fl
         raise InputError(path, f"has {packed} bytes and would unpack to {unpacked}, which no recording does", fix)
 
 
-MOST_MEMBERS = 1000
 ENDING = ".npy"
 Arrays = dict[str, NDArray[Any]]
 
@@ -251,8 +250,8 @@ def read_arrays(path: Path, kind: str, fix: str) -> Arrays:
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
             names = [info.filename for info in members]
-            if len(members) > MOST_MEMBERS:
-                raise InputError(path, f"holds {len(members)} arrays, and {MOST_MEMBERS} are allowed", fix)
+            if len(members) > 1000:
+                raise InputError(path, f"holds {len(members)} arrays, and 1000 are allowed", fix)
             if len(set(names)) != len(names):
                 raise InputError(path, "holds two arrays of one name", fix)
             refuse_bomb(path, size, sum(info.file_size for info in members), fix)
@@ -270,18 +269,18 @@ def read_arrays(path: Path, kind: str, fix: str) -> Arrays:
         raise InputError(path, problem, fix) from None
 
 
-def json_member(path: Path, arrays: Arrays, name: str, fix: str) -> dict[str, Any] | None:
-    """JSON object in one array's text, or None for other content.
+def json_member(path: Path, arrays: Arrays, fix: str) -> dict[str, Any] | None:
+    """JSON object in the text of the array `meta`, or None for other content.
 
     Raises:
         InputError: invalid JSON, or as `documents.parse_json`.
     """
-    array = arrays[name]
+    array = arrays["meta"]
     if array.size != 1 or array.dtype.kind not in "US":
         return None
     text = array.reshape(-1)[0]
     try:
-        value = parse_json(text if isinstance(text, bytes) else str(text), f"{path}: {name}", fix)
+        value = parse_json(text if isinstance(text, bytes) else str(text), f"{path}: meta", fix)
     except InputError as error:
         raise InputError(error.where, f"is not a JSON object ({error.problem})", fix) from None
     return value if isinstance(value, dict) else None

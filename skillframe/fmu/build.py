@@ -215,7 +215,10 @@ class Record:
     """A C struct of array addresses (8-byte numbers), integers and doubles."""
 
     def __init__(self, fields: Mapping[str, NDArray[Any] | int | float]) -> None:
-        names = [(name, _kind(value)) for name, value in fields.items()]
+        names: list[tuple[str, type]] = []
+        for name, value in fields.items():
+            number = ctypes.c_int64 if isinstance(value, int) else ctypes.c_double
+            names.append((name, ctypes.c_void_p if isinstance(value, np.ndarray) else number))
         told = type("Told", (ctypes.Structure,), {"_fields_": names})
         self._told = told(*(x.ctypes.data if isinstance(x, np.ndarray) else x for x in fields.values()))
         self._told.kept = dict(fields)
@@ -225,12 +228,6 @@ class Record:
         found = built[name]
         found.argtypes, found.restype = [ctypes.c_void_p, *more], ctypes.c_int64
         return partial(found, ctypes.byref(self._told))
-
-
-def _kind(value: NDArray[Any] | int | float) -> type:
-    if isinstance(value, np.ndarray):
-        return ctypes.c_void_p
-    return ctypes.c_int64 if isinstance(value, int) else ctypes.c_double
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

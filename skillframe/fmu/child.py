@@ -135,7 +135,11 @@ class Child:
             raise InputError(path, "cannot be run: an FMU runs under limits that this system lacks", "use Linux")
         need("fmpy")
         self.path, self.name, self.limits = path, name, limits
-        self._folder = _private_folder()
+        try:
+            self._folder = tempfile.mkdtemp(prefix="skillframe-fmu-")
+        except OSError as error:
+            text = f"cannot be used: {error.strerror}"
+            raise InputError("folder for temporary files", text, "set TMPDIR") from None
         token = secrets.randbits(64)
         ours, theirs = socket.socketpair()
         given = {
@@ -265,13 +269,6 @@ class Child:
         shutil.rmtree(self._folder, ignore_errors=True)
 
     close = kill
-
-
-def _private_folder() -> str:
-    try:
-        return tempfile.mkdtemp(prefix="skillframe-fmu-")
-    except OSError as error:
-        raise InputError("folder for temporary files", f"cannot be used: {error.strerror}", "set TMPDIR") from None
 
 
 def _environment(folder: str) -> dict[str, str]:

@@ -21,8 +21,6 @@ from skillframe.fmu.extract import forget, is_allowed, is_unpacked, unpack
 from skillframe.fmu.facts import FmuFacts, FmuVariable, values_of
 from skillframe.fmu.inspection import inspect_fmu
 
-MOST_COLUMNS = 100_000
-
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Request:
@@ -62,8 +60,8 @@ def check_request(facts: FmuFacts, request: Request) -> None:
         problem = f"{request.stop:g} s is no whole number of steps of {request.step:g} s"
         raise InputError("--stop", f"{problem}, and {facts.path.name} takes steps of one length", "give a multiple")
     wide = sum(v.size for v in _outputs(facts))
-    if wide > MOST_COLUMNS:
-        raise InputError(facts.path, f"has outputs of {wide} values in all", f"{MOST_COLUMNS} are the most")
+    if wide > 100_000:
+        raise InputError(facts.path, f"has outputs of {wide} values in all", "100000 are the most")
     for name, value in request.parameters.items():
         if any(v != v for v in values_of(facts.settable(name), value, facts.path.name)):
             raise InputError(f"{facts.path.name}: {name}", "is not a number (NaN)", "give a number")

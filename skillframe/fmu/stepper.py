@@ -21,7 +21,6 @@ from skillframe.fmu.build import build_source
 from skillframe.fmu.facts import FLOATS, FmuFacts, FmuVariable, values_of
 
 Float = NDArray[np.float64]
-LARGEST = 64  # variables per slot, as in stepper.c
 Step = Callable[[float, float], int]
 
 
@@ -206,8 +205,8 @@ def wire(instance: Instance, spec: ActuatorSpec, inputs: tuple[str, ...], output
         UnknownName, InputError: as `mapping`; more than 64 variables.
     """
     ins, outs = mapping(spec, instance.facts)
-    if max(len(ins), len(outs)) > LARGEST:
-        raise InputError(instance.name, f"more than {LARGEST} variables are mapped", "map fewer")
+    if max(len(ins), len(outs)) > 64:  # as in stepper.c
+        raise InputError(instance.name, "more than 64 variables are mapped", "map fewer")
     return Wiring(
         instance,
         [v.reference for v in ins.values()], [inputs.index(name) for name in ins],

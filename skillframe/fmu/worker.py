@@ -98,7 +98,11 @@ class Worker:
         self._take(given["u"])
         self.one.status[:] = 0
         self.one.start(given["time"], [given["parameters"]])
-        return struct.pack("q", _resident()) + self._told()
+        try:
+            resident = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])  # pages
+        except (OSError, ValueError, IndexError):
+            resident = 0
+        return struct.pack("q", resident * os.sysconf("SC_PAGE_SIZE")) + self._told()
 
     def step(self, payload: bytes) -> bytes:
         """Step, or refresh for a zero step."""
@@ -159,10 +163,3 @@ def _at(payload: bytes) -> Path:
 
 def _facts(given: dict[str, Any]) -> FmuFacts:
     return facts_from(given["facts"], Path(given["path"]))
-
-
-def _resident() -> int:
-    try:
-        return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE")
-    except (OSError, ValueError, IndexError):
-        return 0

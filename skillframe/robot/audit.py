@@ -260,7 +260,9 @@ def joint_warnings(robot: RobotModel) -> Iterator[Problem]:
     """Missing or implausible limits, mimic and continuous joints, and missing meshes."""
     passive = tuple(robot.urdf.joints) if robot.spec.own_law else robot.followers
     for joint in robot.urdf.joints.values():
-        yield from _effort(joint, passive)
+        if joint.type in _ACTUATED and joint.name not in passive and not _limit(joint, "effort") > 0.0:
+            text = f"joint {joint.name!r} has no effort limit; its motor counts as unlimited"
+            yield _warning("no_effort_limits", joint.name, text, 'write effort="..." [N m or N] in its <limit>')
         yield from _position(joint)
         yield from _in_another_unit(joint)
         if joint.type == CONTINUOUS and not robot.spec.loop:
@@ -295,14 +297,6 @@ def giant_meshes(bodies: list[Body]) -> Iterator[Problem]:
                 text = f"mesh {mesh!r} is {size:.3g} m long, and the robot reaches {reach:.3g} m from joint to joint"
                 fix = 'if it is drawn in millimetres, write scale="0.001 0.001 0.001" in its <mesh>'
                 yield Problem(code="giant_mesh", severity="fatal", where=body.links[0], message=text, fix=fix)
-
-
-def _effort(joint: Joint, passive: tuple[str, ...]) -> Iterator[Problem]:
-    if joint.type not in _ACTUATED or joint.name in passive:
-        return
-    if not _limit(joint, "effort") > 0.0:
-        text = f"joint {joint.name!r} has no effort limit; its motor counts as unlimited"
-        yield _warning("no_effort_limits", joint.name, text, 'write effort="..." [N m or N] in its <limit>')
 
 
 def _position(joint: Joint) -> Iterator[Problem]:

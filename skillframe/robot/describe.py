@@ -43,7 +43,14 @@ def describe(robot: RobotModel, of_drive: Sequence[str] = ()) -> str:
         lines += ["", f"  arm {arm.name!r}: tool frame {arm.tool_frame!r}{_axis(arm)}"]
         lines += [f"    at home {_triple(pose.position)} m, turned by the rotation vector {_triple(turn, 1)} degrees"]
         lines += [f"    z axis (out along the tool) {_triple(pose.rotation[:, 2])}"]
-    return "\n".join([*lines, *_machine(robot, of_drive)])
+    machine = [f"  loop: {loop.frame_a} meets {loop.frame_b}" for loop in spec.loop]
+    machine += [f"  {a.joint} is driven by {a.fmu}{_how(a, spec)}" for a in spec.actuation]
+    machine += [f"  {n} is drawn backwards in the URDF: here it grows as the rod slides out" for n in robot.turned]
+    machine += of_drive
+    if spec.payload is not None:
+        load = spec.payload
+        machine.append(f"  payload {load.mass:g} kg in {load.link!r}, rated for {load.rating:g} kg")
+    return "\n".join([*lines, "", *machine] if machine else lines)
 
 
 def _axis(arm: Arm) -> str:
@@ -58,18 +65,6 @@ def _closed(robot: RobotModel) -> RobotModel:
         return replace(robot, home=chain.home)
     except SkillframeError:
         return robot
-
-
-def _machine(robot: RobotModel, of_drive: Sequence[str]) -> list[str]:
-    spec = robot.spec
-    lines = [f"  loop: {loop.frame_a} meets {loop.frame_b}" for loop in spec.loop]
-    lines += [f"  {a.joint} is driven by {a.fmu}{_how(a, spec)}" for a in spec.actuation]
-    lines += [f"  {name} is drawn backwards in the URDF: here it grows as the rod slides out" for name in robot.turned]
-    lines += of_drive
-    if spec.payload is not None:
-        load = spec.payload
-        lines.append(f"  payload {load.mass:g} kg in {load.link!r}, rated for {load.rating:g} kg")
-    return ["", *lines] if lines else []
 
 
 def _measured(spec: RobotSpec) -> list[str]:

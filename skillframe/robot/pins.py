@@ -21,8 +21,6 @@ from skillframe.robot.urdf import INERTIA, Joint, Urdf, numbers
 
 PARALLEL = 1e-3
 """Sine of the largest angle between hinges that count as parallel."""
-BARREL, SLENDER = 0.6, 0.01
-"""Share of a strut's mass in its barrel; inertia about its own axis over that across it."""
 
 
 def drawn(urdf: Urdf, loops: Sequence[LoopClosure], struts: Sequence[Strut], where: str) -> Urdf:
@@ -67,7 +65,7 @@ def _draw(robot: ET.Element, urdf: Urdf, placed: dict[str, pin.SE3], strut: Stru
         way = np.eye(3)[int(np.argmin(np.abs(axis)))]
     x = across @ way / np.linalg.norm(across @ way)
     turn = pin.rpy.matrixToRpy(np.column_stack([x, axis, cross(x, axis)]))
-    barrel, rod = BARREL * strut.mass, (1.0 - BARREL) * strut.mass
+    barrel, rod = 0.6 * strut.mass, 0.4 * strut.mass
     _link(robot, f"{name}_barrel", barrel, 0.5 * strut.closed, strut.closed)
     _link(robot, f"{name}_rod_eye", rod, -0.5 * strut.stroke, strut.stroke)
     at = np.array(base[1]) + strut.beside * axis
@@ -127,7 +125,7 @@ def _link(robot: ET.Element, name: str, mass: float, middle: float, length: floa
     across = mass * length**2 / 12.0
     ET.SubElement(inertial, "origin", xyz=f"{middle!r} 0 0")
     ET.SubElement(inertial, "mass", value=repr(mass))
-    values = (SLENDER * across, across, across, 0.0, 0.0, 0.0)
+    values = (0.01 * across, across, across, 0.0, 0.0, 0.0)
     ET.SubElement(inertial, "inertia", dict(zip(INERTIA, map(repr, values), strict=True)))
 
 

@@ -132,12 +132,15 @@ class Collisions:
         if not self.enabled or not len(rows):
             return []
         near = rows[~self._clear(plant, rows)]
-        found = [(row, self._probe.overlaps(*posture, of_fixture)) for row, posture in self._postures(plant, near)]
-        told = [(row, next(filter(self._counts, overlaps), None)) for row, overlaps in found]
-        return [self._touch(row, overlap) for row, overlap in told if overlap is not None]
-
-    def _counts(self, overlap: Overlap) -> bool:
-        return overlap.depth > TOLERANCE or any(self._parts[i].key == FIXTURE for i in overlap.pair)
+        result = []
+        for row, posture in self._postures(plant, near):
+            for overlap in self._probe.overlaps(*posture, of_fixture):
+                parts = [self._parts[i] for i in overlap.pair]
+                if overlap.depth > TOLERANCE or any(part.key == FIXTURE for part in parts):
+                    one, two = sorted(parts, key=lambda part: _MOVERS.index(part.role))
+                    result.append(Touch(row, one.name, two.name, overlap.depth))
+                    break
+        return result
 
     def measure(self, plant: Plant, rows: NDArray[np.int64]) -> None:
         """Update `distance` of some trials."""
@@ -177,10 +180,6 @@ class Collisions:
         finite = np.isfinite(free).all(axis=-1)
         for k in np.flatnonzero(finite):
             yield int(rows[k]), (free[k], at[k], turn[k])
-
-    def _touch(self, row: int, overlap: Overlap) -> Touch:
-        one, two = sorted((self._parts[i] for i in overlap.pair), key=lambda part: _MOVERS.index(part.role))
-        return Touch(row, one.name, two.name, overlap.depth)
 
 
 _ORDER = (NEIGHBOURS, LOOP, HOME, HOLDS, IGNORED)

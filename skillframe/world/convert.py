@@ -254,10 +254,12 @@ def close_loops(spec: mujoco.MjSpec, model: pin.Model, loops: Sequence[LoopClosu
         return
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
     for index, loop in enumerate(loops):
-        sites = [
-            _site(model, name, bodies, f"loop_{index}_{side}")
-            for side, name in zip("ab", (loop.frame_a, loop.frame_b), strict=True)
-        ]
+        sites = [f"loop_{index}_a", f"loop_{index}_b"]
+        for site, name in zip(sites, (loop.frame_a, loop.frame_b), strict=True):
+            if not model.existFrame(name):
+                raise UnknownName("frame", name, [f.name for f in model.frames], "named in [[loop]]")
+            frame = model.frames[model.getFrameId(name)]
+            bodies[frame.parentJoint].add_site(name=site, pos=frame.placement.translation)
         equality = spec.add_equality(
             name=f"loop_{index}", type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_SITE,
             name1=sites[0], name2=sites[1],
@@ -279,11 +281,3 @@ def couple_followers(spec: mujoco.MjSpec, robot: RobotModel) -> None:
 def _stiffen(spec: mujoco.MjSpec, equality: Any) -> None:
     equality.solref = [2.2 * spec.option.timestep, 1.0]  # time steps; MuJoCo's minimum is 2
     equality.solimp = (0.9999, 0.9999, 0.001, 0.5, 2.0)
-
-
-def _site(model: pin.Model, name: str, bodies: dict[int, Any], site: str) -> str:
-    if not model.existFrame(name):
-        raise UnknownName("frame", name, [f.name for f in model.frames], "named in [[loop]]")
-    frame = model.frames[model.getFrameId(name)]
-    bodies[frame.parentJoint].add_site(name=site, pos=frame.placement.translation)
-    return site

@@ -150,9 +150,16 @@ def link_shapes(robot: RobotModel) -> list[LinkShape]:
     tool = tool_links(robot)
     found: list[LinkShape] = []
     for name, link in robot.urdf.links.items():
-        if robot.model.existBodyName(name):
-            frame = robot.model.frames[robot.model.getBodyId(name)]
-            found += [shape._replace(tool=name in tool) for shape in _shapes_of(robot, name, link, frame)]
+        if not robot.model.existBodyName(name):
+            continue
+        frame = robot.model.frames[robot.model.getBodyId(name)]
+        body = robot.model.names[frame.parentJoint]
+        for tag in ("collision", "visual"):
+            made = [_shape(robot, element, frame.placement) for element in link.findall(tag)]
+            shapes = [LinkShape(name, body, *pair, tool=name in tool) for pair in made if pair is not None]
+            found += shapes
+            if shapes:
+                break
     heads = {joint.name: joint.child for joint in robot.urdf.joints.values()}
     for joint, bone in bones(robot.model, {shape.body for shape in found}):
         head = heads.get(joint, robot.urdf.root)
@@ -172,16 +179,6 @@ def tool_links(robot: RobotModel) -> set[str]:
     return tool
 
 
-def _shapes_of(robot: RobotModel, name: str, link: ET.Element, frame: pin.Frame) -> list[LinkShape]:
-    body = robot.model.names[frame.parentJoint]
-    for tag in ("collision", "visual"):
-        made = [_shape(robot, element, frame.placement) for element in link.findall(tag)]
-        shapes = [LinkShape(name, body, *pair) for pair in made if pair is not None]
-        if shapes:
-            return shapes
-    return []
-
-
 def _shape(robot: RobotModel, element: ET.Element, placement: pin.SE3) -> tuple[Geom, Float | None] | None:
     mesh = element.find("geometry/mesh")
     if mesh is None:
@@ -189,7 +186,13 @@ def _shape(robot: RobotModel, element: ET.Element, placement: pin.SE3) -> tuple[
         return None if geom is None or min(geom.size) <= 0.0 else (geom, None)
     file = resolve_mesh(mesh.get("filename", ""), robot.urdf.path)
     read = None if file is None else read_mesh(file)
-    known = None if read is None else _known(read, mesh_scale(mesh))
+    if read is None:
+        return None
+    corners = np.ascontiguousarray(read.corners * mesh_scale(mesh)).reshape(-1, 3)
+    key = hashlib.blake2b(corners.tobytes(), digest_size=16).digest()
+    if key not in _KNOWN:
+        _KNOWN[key] = _looked_at(corners, read.thinned)
+    known = _KNOWN[key]
     if known is None:
         return None
     at = Pose(np.array(placement.translation), np.array(placement.rotation)).compose(origin_of(element))
@@ -234,14 +237,6 @@ class KnownMesh(NamedTuple):
 
 _KNOWN: dict[bytes, KnownMesh | None] = {}
 """Cache by content."""
-
-
-def _known(read: ReadMesh, scale: Float) -> KnownMesh | None:
-    corners = np.ascontiguousarray(read.corners * scale).reshape(-1, 3)
-    key = hashlib.blake2b(corners.tobytes(), digest_size=16).digest()
-    if key not in _KNOWN:
-        _KNOWN[key] = _looked_at(corners, read.thinned)
-    return _KNOWN[key]
 
 
 def _looked_at(corners: Float, few: bool) -> KnownMesh | None:

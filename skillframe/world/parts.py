@@ -124,22 +124,18 @@ class _Tree:
     def __init__(self, robot: RobotModel, shaped: set[int]) -> None:
         self.parents, self.shaped = [int(joint) for joint in robot.model.parents], {0, *shaped}
         self.above = {joint.child: joint.parent for joint in robot.urdf.joints.values()}
-        ends = [
-            [int(robot.model.frames[robot.model.getFrameId(name)].parentJoint) for name in (loop.frame_a, loop.frame_b)]
-            for loop in robot.spec.loop
-        ]
-        self.loops = [self._between(*pair) for pair in ends]
+        self.loops = list[set[int]]()
+        for loop in robot.spec.loop:
+            frames = (robot.model.frames[robot.model.getFrameId(name)] for name in (loop.frame_a, loop.frame_b))
+            first, second = (self._up(int(frame.parentJoint)) for frame in frames)
+            shared = next(joint for joint in first if joint in second)
+            self.loops.append({*first[: first.index(shared)], *second[: second.index(shared)], shared})
 
     def _up(self, joint: int) -> list[int]:
         found = [joint]
         while found[-1]:
             found.append(self.parents[found[-1]])
         return found
-
-    def _between(self, one: int, two: int) -> set[int]:
-        first, second = self._up(one), self._up(two)
-        shared = next(joint for joint in first if joint in second)
-        return {*first[: first.index(shared)], *second[: second.index(shared)], shared}
 
     def carriers(self, joint: int) -> list[int]:
         """A body and its ancestors."""

@@ -109,7 +109,18 @@ class Probe:
         """Overlaps above a tolerance [m] in a posture, the deepest first."""
         self._pose(free, position, quaternion)
         mujoco.mj_collision(self._model, self._data)
-        return self._depths(tolerance) if self._data.ncon else []
+        if not self._data.ncon:
+            return []
+        deepest: dict[Pair, float] = {}
+        for one, two in np.unique(self._data.contact.geom, axis=0).tolist():
+            i, k = sorted((int(self._part[one]), int(self._part[two])))
+            depth = -self._distance(one, two)
+            for geom, other in ((one, two), (two, one)):
+                if geom in self._surface and depth > tolerance:
+                    depth = min(depth, self._deepest_point(geom, other))
+            if depth > max(tolerance, deepest.get((i, k), 0.0)):
+                deepest[i, k] = depth
+        return sorted((Overlap(*item) for item in deepest.items()), key=lambda found: -found.depth)
 
     def _pose(self, free: Float, position: Float, quaternion: Float) -> None:
         data = self._data
@@ -142,18 +153,6 @@ class Probe:
                 one, two = self._pairs[pairs[i]].tolist()
                 found[k] = min(found[k], mujoco.mj_geomDistance(self._model, data, one, two, max(found[k], 0.0), None))
         return np.array(found)
-
-    def _depths(self, tolerance: float) -> list[Overlap]:
-        deepest: dict[Pair, float] = {}
-        for one, two in np.unique(self._data.contact.geom, axis=0).tolist():
-            i, k = sorted((int(self._part[one]), int(self._part[two])))
-            depth = -self._distance(one, two)
-            for geom, other in ((one, two), (two, one)):
-                if geom in self._surface and depth > tolerance:
-                    depth = min(depth, self._deepest_point(geom, other))
-            if depth > max(tolerance, deepest.get((i, k), 0.0)):
-                deepest[i, k] = depth
-        return sorted((Overlap(*item) for item in deepest.items()), key=lambda found: -found.depth)
 
     def _deepest_point(self, geom: int, other: int) -> float:
         at, turn = self._frame(geom)

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from skillframe.robot.model import RobotModel
 
 _NEAR = Range(-3.0, 3.0, "as no arm or crane works further from where it begins")
-_HELD = Range(-0.5, 0.5, "as no tool is held further from its grip")
 _LEAN = Range(-pi / 2.0, pi / 2.0, "as what leans more lies upside down")
 _TURN = Range(-pi, pi, "half a turn to either side")
 _FULL_SCALE = "the full scale of large wrist sensors"
@@ -50,7 +49,10 @@ def _biases(kind: str, unit: str, limits: Range) -> list[Quantity]:
 QUANTITIES = (
     *_pose("start", "where the tool's tip starts, from the nominal start, in the nominal fixture's axes", _NEAR),
     *_pose("fixture", "where the fixture truly stands, unknown to the robot", _NEAR),
-    *_pose("grasp", "how the tool truly sits in the grip, unknown to the robot", _HELD),
+    *_pose(
+        "grasp", "how the tool truly sits in the grip, unknown to the robot",
+        Range(-0.5, 0.5, "as no tool is held further from its grip"),
+    ),
     *_biases("force", "N", Range(-1000.0, 1000.0, _FULL_SCALE)),
     *_biases("torque", "N m", Range(-100.0, 100.0, _FULL_SCALE)),
     Quantity("sensor.force_noise", "N", 0.3, "standard deviation of each force reading, at 1 kHz",

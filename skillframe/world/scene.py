@@ -273,17 +273,14 @@ class Scene:
         groups |= {f"sprung part {part.name!r}": part.geoms for part in self.sprung}
         for group, geoms in groups.items():
             for index, geom in enumerate(geoms):
-                _check(geom, f"world {self.name}: {geom.kind} {index} of the {group}")
-
-
-def _check(geom: Geom, where: str) -> None:
-    if geom.kind not in KINDS:
-        raise UnknownName("kind", geom.kind, KINDS, where=where)
-    if geom.kind != "mesh":
-        return
-    if geom.vertices is None:
-        raise InputError(where, "has no vertices", "give them as (V, 3) in metres")
-    if geom.surface is not None and (any(geom.position) or geom.quaternion != IDENTITY):
-        raise InputError(where, "has a surface and a place of its own", "turn and move the surface")
-    if geom.collide and geom.surface is None and (unfit := unfit_to_collide(geom.vertices, geom.faces)):
-        raise InputError(where, *unfit)
+                where = f"world {self.name}: {geom.kind} {index} of the {group}"
+                if geom.kind not in KINDS:
+                    raise UnknownName("kind", geom.kind, KINDS, where=where)
+                if geom.kind != "mesh":
+                    continue
+                if geom.vertices is None:
+                    raise InputError(where, "has no vertices", "give them as (V, 3) in metres")
+                if geom.surface is not None and (any(geom.position) or geom.quaternion != IDENTITY):
+                    raise InputError(where, "has a surface and a place of its own", "turn and move the surface")
+                if geom.collide and geom.surface is None and (unfit := unfit_to_collide(geom.vertices, geom.faces)):
+                    raise InputError(where, *unfit)

@@ -129,7 +129,11 @@ def opened() -> ctypes.CDLL | None:
     for _ in range(2):
         headers = Path(mujoco.__file__).parent / "include"
         built = build_library("contacts", whole, include=headers, flags=("-O3",))
-        if built is None or not _loaded_engine():
+        if built is None:
+            return None
+        try:
+            _engine()
+        except (OSError, StopIteration):
             return None
         try:
             return ctypes.CDLL(str(built), mode=ctypes.RTLD_LOCAL)
@@ -157,14 +161,6 @@ def _engine() -> ctypes.CDLL:
     import mujoco
 
     return ctypes.CDLL(str(next(Path(mujoco.__file__).parent.glob("libmujoco.*"))), mode=ctypes.RTLD_GLOBAL)
-
-
-def _loaded_engine() -> bool:
-    try:
-        _engine()
-    except (OSError, StopIteration):
-        return False
-    return True
 
 
 def _require() -> Any:

@@ -50,7 +50,10 @@ def _copied(time: Float, values: Float) -> list[tuple[float, float, float]]:
     ordered = np.sort(bits)
     if not np.any(ordered[1:] == ordered[:-1]):
         return []  # as in nearly every recording
-    before = _last_equal(bits)
+    order = np.argsort(bits, kind="stable")
+    equal = bits[order[1:]] == bits[order[:-1]]
+    before = np.full(len(bits), -1, dtype=np.intp)  # index of the last earlier equal sample, or -1
+    before[order[1:][equal]] = order[:-1][equal]
     distance = np.where(before >= 0, np.arange(len(before)) - before, 0)
     edges = np.concatenate([[0], np.flatnonzero(np.diff(distance)) + 1, [len(distance)]])
     chosen = np.flatnonzero(distance[edges[:-1]] > 0)
@@ -81,15 +84,6 @@ def _mixed(result: Bits, parts: Iterable[Bits]) -> Bits:
     for part in parts:
         result = (result ^ part) * np.uint64(0x9E3779B97F4A7C15)
         result ^= result >> np.uint64(29)
-    return result
-
-
-def _last_equal(bits: Bits) -> NDArray[np.intp]:
-    """Index (T,) of the last earlier equal sample, or -1."""
-    order = np.argsort(bits, kind="stable")
-    equal = bits[order[1:]] == bits[order[:-1]]
-    result = np.full(len(bits), -1, dtype=np.intp)
-    result[order[1:][equal]] = order[:-1][equal]
     return result
 
 

@@ -29,7 +29,9 @@ def saturated(time: Float, wrench: Float) -> list[Flaw]:
         channel, sensor = wrench[:, i], slice(i - i % 3, i - i % 3 + 3)
         starts = np.concatenate([[0], np.flatnonzero(channel[1:] != channel[:-1]) + 1])
         lengths = np.diff(np.append(starts, len(channel)))
-        if len(starts) < 20 or not _leaves_its_steps(channel[fresh]):
+        new = channel[fresh]
+        inner = new[(new > new.min()) & (new < new.max())]
+        if len(starts) < 20 or not white_noise(inner) > resolution(new):  # its noise stays within its resolution
             continue
         goes_on = _changes(wrench[:, sensor])
         goes_on = goes_on[starts + lengths - 1] > goes_on[starts]
@@ -47,12 +49,6 @@ def saturated(time: Float, wrench: Float) -> list[Flaw]:
 
 def _changes(values: Float) -> NDArray[np.intp]:
     return np.concatenate([[0], np.cumsum(np.any(values[1:] != values[:-1], axis=1))])
-
-
-def _leaves_its_steps(channel: Float) -> bool:
-    """Whether the noise of new samples (T,), extremes excluded, exceeds their resolution."""
-    inner = channel[(channel > channel.min()) & (channel < channel.max())]
-    return white_noise(inner) > resolution(channel)
 
 
 def _joined(time: Float, spans: list[tuple[int, int]], name: str, extreme: float) -> list[Flaw]:

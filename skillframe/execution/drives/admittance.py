@@ -86,15 +86,11 @@ class AdmittanceDrive(TorqueDrive):
             if self.arm.kind == "position":
                 self._sent = self._joints
         self._tick += 1
-        self._drive()
-        return self._law
-
-    def _drive(self) -> None:
-        """Compute the torques of the arm's own loop and motors."""
-        reading, position = self._reading, self.limb.joint_positions()
+        reading, position = self._reading, self.limb.joint_positions()  # now the arm's own loop and motors
         self._torque = self._inner.torque(self._sent, position, reading.velocity, reading.bias)
         if self.motors is not None:
             self._torque = self.motors.held(self._torque, reading.velocity, position)
+        return self._law
 
     def notes(self, i: int) -> list[str]:
         """The arm's interface and the pace of the skill's clock."""

@@ -142,21 +142,20 @@ class ArmsDrive:
 
     def act(self, command: Command, ramp: float) -> Float:
         """Apply each arm's command, and return wrenches (N, arms, 6)."""
+
+        def rows(gain: Float) -> Float:
+            return np.broadcast_to(gain, (*self.shape, 6, 6)).reshape(-1, 6, 6)
+
+        stiffness, damping = command.impedance
         law = self.rows.act(
             command._replace(
                 pose=Pose(command.pose.position.reshape(-1, 3), command.pose.rotation.reshape(-1, 3, 3)),
                 twist=command.twist.reshape(-1, 6), feedforward=command.feedforward.reshape(-1, 6),
-                impedance=self._impedance_rows(command.impedance),
+                impedance=Impedance(rows(stiffness), None if damping is None else rows(damping)),
             ),
             ramp,
         )  # fmt: skip
         return law.reshape(*self.shape, 6)
-
-    def _impedance_rows(self, impedance: Impedance) -> Impedance:
-        def rows(gain: Float) -> Float:
-            return np.broadcast_to(gain, (*self.shape, 6, 6)).reshape(-1, 6, 6)
-
-        return Impedance(rows(impedance.stiffness), None if impedance.damping is None else rows(impedance.damping))
 
     def violations(self, tick: int, active: Trials) -> list[Broken]:
         """Trials in which an arm broke a limit, with the arm's name."""
