@@ -53,9 +53,10 @@ def test_the_readme_s_steps_can_be_typed_one_by_one(tmp_path, monkeypatch):
 @pytest.mark.needs_plugins
 def test_the_readme_s_python_inserts_the_peg_and_is_about_ten_lines(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    exec(compile(PYTHON, "README.md", "exec"), {})
+    assert PYTHON.count("trials=40") == 1  # the lines are what is tried here; 4 trials take a tenth of the time
+    exec(compile(PYTHON.replace("trials=40", "trials=4"), "README.md", "exec"), {})
     said = capsys.readouterr().out
-    assert "SingleRun(peg by panda in peg_in_hole: success" in said and "40" in said.splitlines()[-1]
+    assert "SingleRun(peg by panda in peg_in_hole: success" in said and "4 of 4" in said.splitlines()[-1]
     assert len([line for line in PYTHON.splitlines() if line.strip()]) <= 11
 
 
