@@ -70,7 +70,7 @@ def repeated_stamps(made: Made, path: Path) -> tuple[bool, str]:
     twice, shared = len(made.names["twice"]) - len(made.names["ts"]), len(made.names["k"])  # as make.py drew them
     notes = [says(audit["notes"], "twice", rf"\b{twice}\b"), says(audit["notes"], "stamp", rf"\b{shared}\b")]
     wrong = touches_once(audit, 3002.5, 3006.0) or f"{audit['rate_hz']:.4g} Hz" * (abs(audit["rate_hz"] - 500) > 10)
-    typed("convert", *words[2:], "--out", made.folder / "spread.npz")
+    typed("convert", *words[1:], "--out", made.folder / "spread.npz")
     skill = learned(made, made.folder / "spread.npz")
     return bool(not wrong and all(notes) and skill.slides), wrong or (
         skill.said if not skill.slides else "; ".join(notes)

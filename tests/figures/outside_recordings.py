@@ -147,7 +147,7 @@ def proposed(path: Path, *options: object) -> tuple[dict[str, Any], Answer]:
 
 def as_proposed(made: Made, found: dict[str, Any], *more: object) -> Demonstration | str:
     """The demonstration that the proposed line reads, or the error."""
-    return converted(made, *shlex.split(found["line"])[3:], *more)
+    return converted(made, *shlex.split(found["line"])[2:], *more)
 
 
 def converted(made: Made, *words: object) -> Demonstration | str:
@@ -180,14 +180,16 @@ class Learned(NamedTuple):
             return 180.0
         return float(np.degrees(np.arccos(np.clip(self.push @ np.asarray(direction), -1, 1))))
 
-    def frees(self, axis: Sequence[float]) -> bool:
-        """Whether an axis is free to 15 degrees."""
-        return bool(np.any(np.linalg.norm(self.free @ np.asarray(axis)[:, None], axis=1) > np.cos(np.radians(15.0))))
-
     @property
     def slides(self) -> bool:
-        """Whether it is a push along -z that is free along x, to the 15 degrees to which `learn` names axes."""
-        return self.off([0, 0, -1]) < 15.0 and self.frees([1, 0, 0])
+        """Whether it is a push along -z that is free along x, to the 15 degrees to which `learn` names axes.
+
+        One slide to one side leaves the push open, which is as right where what is open covers -z.
+        """
+        said = re.search(r"the push is open: up to (\d+) degrees", self.said)
+        most = float(said[1]) if said else 15.0
+        along = np.linalg.norm(self.free @ np.array([[1.0], [0.0], [0.0]]), axis=1)
+        return self.off([0, 0, -1]) < most and bool(np.any(along > np.cos(np.radians(most))))
 
     @property
     def sure(self) -> bool:

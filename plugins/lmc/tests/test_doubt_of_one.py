@@ -18,20 +18,21 @@ from tests.sound_slides import eased, slide, slow_noise
 pytestmark = pytest.mark.needs_plugins
 
 
-def pushed_aside(seed: int, way: float = 0.008, sign: float = -1.0) -> Demonstration:
-    """Straight down by 260 mm, wandering, while the hand pushes 50 degrees aside, then a press of 60 N.
+def pushed_aside(seed: int, way: float = 0.008, sign: float = -1.0, aside_deg: float = 50.0) -> Demonstration:
+    """Straight down by 260 mm, wandering, while the hand pushes aside, then a press of 60 N.
 
     Args:
         seed: of all that is drawn.
         way: how far it wanders [m].
         sign: -1 for the wrench of the environment, 1 for the hand's taken for it.
+        aside_deg: angle of the hand's push to straight down [degrees].
     """
     rng = np.random.default_rng([seed, 19])
     time = np.arange(0.0, 5.0, 0.01)
     u = np.clip((time - 0.5) / 3.0, 0.0, 1.0)
     wander = slow_noise(rng, time, 0.6, 3) * way * np.sin(np.pi * u)[:, None]
     position = np.array([0.3, 0.2, 0.5]) - np.outer(0.26 * u**3 * (10.0 - 15.0 * u + 6.0 * u**2), [0, 0, 1]) + wander
-    aside = np.radians(50.0)
+    aside = np.radians(aside_deg)
     hand = 25.0 * np.array([-np.sin(aside), 0.0, -np.cos(aside)])
     force = np.outer(np.clip((time - 0.5) / 0.3, 0.0, 1.0) * (time < 3.5), hand)
     force += np.outer(np.clip((time - 3.5) / 0.1, 0.0, 1.0), [-8.0, -5.0, -60.0])
@@ -80,6 +81,19 @@ def test_a_hand_that_wanders_far_and_pushes_aside_is_asked_for_the_other_side(se
     off, _, then = said(pushed_aside(seed, 0.02))
     assert off is not None and off > 10.0
     assert then.startswith(OTHER_SIDE)
+
+
+def test_four_demonstrations_whose_hand_pushes_aside_are_doubted_because_the_press_at_the_end_is_elsewhere() -> None:
+    """They agree on a push, which was the hand's in the air."""
+    document = learned(
+        registry().skill("lmc"), [pushed_aside(seed, 0.02, aside_deg=70.0) for seed in range(4)], LearnOptions()
+    )
+    sure, then = advice(document)
+    assert sure.startswith("doubtful: at the end the tool was pressed") and then == OTHER_SIDE
+    (degrees,) = re.findall(r"(\d+) degrees", sure)
+    push = np.array(document["phases"][0]["translation"]["desired_direction"])
+    pressed = np.array([-8.0, -5.0, -60.0]) / np.linalg.norm([8.0, 5.0, 60.0])
+    assert float(degrees) == pytest.approx(np.degrees(np.arccos(push @ pressed)), abs=2.0)
 
 
 @pytest.mark.parametrize("seed", [0, 2, 4, 13, 25, 31, 42, 47])

@@ -156,7 +156,7 @@ def test_plugins_show_says_units(capsys):
 def test_a_name_of_a_plugin_that_is_not_installed_comes_with_the_line_that_installs_it(
     capsys, fresh_registry, monkeypatch
 ):
-    monkeypatch.setattr("skillframe.extend.registry.installed", lambda: [])
+    monkeypatch.setattr(sys.modules[Registry.__module__], "installed", list)
     for words, line in (
         (
             ["learn", "x.npz", "--out", "x.json"],

@@ -44,6 +44,7 @@ class Learned:
         means: (n, 3) mean directions of those that moved.
         speed: mean demonstrated speed, without pauses [m/s or rad/s].
         pressed: standing force of each demonstration, where it decided.
+        press_off: angle of the standing force to the push, where it contradicts the push [rad]; 0 otherwise.
         told: (3,) given direction, where the demonstrations show none.
         aligned: a demonstrated push only aligned a part that is known to go straight.
         measured: whether the turning load was measured.
@@ -60,6 +61,7 @@ class Learned:
     means: Float
     speed: float
     pressed: Sequence[Press] = ()
+    press_off: float = 0.0
     told: Float | None = None
     aligned: bool = False
     measured: bool = True
@@ -184,6 +186,11 @@ def _direction_message(part: Learned, settings: Settings, open_direction: bool) 
         return "too few intervals in which the teacher did the work to find a direction"
     if choice.direction is None:
         return _no_direction_message(part, choice)
+    if part.press_off:
+        return (
+            f"doubtful: at the end the tool was pressed {degrees(part.press_off):.0f} degrees off this push; on the "
+            "way the hand may have pushed aside"
+        )
     if open_direction:
         who = "one demonstration leaves" if len(part.moving) == 1 else "demonstrations from one side leave"
         return (

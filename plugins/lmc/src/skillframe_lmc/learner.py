@@ -41,7 +41,7 @@ from skillframe_lmc.intervals import Motion, Track
 from skillframe_lmc.phase import Stop
 from skillframe_lmc.pieces import Pieces, pushed, some, turned, until_left, whole_witness
 from skillframe_lmc.posterior import PUSH_EXISTS, TURN_EXISTS, Choice, decide, witnesses
-from skillframe_lmc.press import Press, presses
+from skillframe_lmc.press import LEANING, Press, presses
 from skillframe_lmc.sectors import concatenated, sectors
 from skillframe_lmc.settings import LEVER_M, Settings
 from skillframe_lmc.work import Work, work
@@ -102,7 +102,8 @@ def _translation(
         turned_too = rotation.direction is not None
         shown, done = pushed([touching[i] for i in which], moving, settings, turned_too=turned_too), work(moving)
         choice = None if done.environment_drove else _choice("translation", moving, shown, settings)
-    stood = _standing(tracks, motions, moving, choice)
+    found = presses(tracks, motions) if len(moving) == len(motions) else None
+    stood = None if found is None else _standing(found, choice)
     if stood is not None:
         done, choice = stood.work, stood.choice
     direction = None if choice is None else choice.direction
@@ -116,6 +117,7 @@ def _translation(
     return Learned(
         name="translation", motions=motions, moving=moving, pieces=shown, work=done, choice=choice, axes=axes,
         means=means, speed=_speed(moving), pressed=() if stood is None else stood.presses, told=told,
+        press_off=0.0 if found is None or stood is not None or choice is None else _press_off(found, choice),
         one_motion=_one_motion("translation", moving, shown, choice, settings),
     )  # fmt: skip
 
@@ -193,19 +195,24 @@ class _Standing(NamedTuple):
         return np.array([unit(d).mean(axis=0) for d in touched if norm(d).sum() >= least]).reshape(-1, 3)
 
 
-def _standing(
-    tracks: Sequence[Track], motions: Sequence[Motion], moving: Sequence[Motion], moved: Choice | None
-) -> _Standing | None:
-    """Result of the standing force, or None unless all were pressed.
+def _press_off(found: Sequence[Press], choice: Choice) -> float:
+    """Angle [rad] of the standing force to the push of the motion, 0 within the plateau and a teacher's lean."""
+    if choice.direction is None:
+        return 0.0
+    stood = unit(np.sum([unit(p.votes.mean(axis=0)) for p in found], axis=0))
+    off = float(np.arccos(np.clip(stood @ choice.direction, -1.0, 1.0)))
+    return off if off > choice.half_width + LEANING else 0.0
 
-    It is used where the motion gives no direction (`moved`), or met nothing on the way.
+
+def _standing(found: list[Press], moved: Choice | None) -> _Standing | None:
+    """Result of the standing force of all demonstrations, or None where the motion (`moved`) decides.
+
+    It is used where the motion gives no direction, or met nothing on the way.
 
     Raises:
         InputError: no push explains demonstrations that were pressed along their way; the skill would be compliant
             along its only motion.
     """
-    if len(moving) != len(motions) or (found := presses(tracks, motions)) is None:
-        return None
     in_air = all(p.in_air for p in found)
     done = work([p.motion for p in found])
     if done.environment_drove or not (in_air or moved is None or moved.direction is None):

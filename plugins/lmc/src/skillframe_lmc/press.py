@@ -16,6 +16,9 @@ the way (median force under 0.15 of the standing one, fewer than three intervals
 
 weighted by variances (maximum likelihood). s is the standard error of u from headings over 0.5 s, half of them
 independent, at least 2 degrees. p is 5 degrees, because a teacher at rest leans to one side throughout.
+
+Where the motion does decide, a standing force outside its plateau by more than p contradicts it, and the push is
+doubtful: a hand that leads an arm through air may push far aside of the way.
 """
 
 from __future__ import annotations
