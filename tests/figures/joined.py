@@ -23,6 +23,7 @@ from skillframe_certify.joined import joined
 from skillframe import Campaign, learn, record
 
 REACH_M = 0.07
+DURATION_S = 3.0  # so that friction and noise decide whether a run from afar ends in time
 REAL = {"world.friction": (0.2, 0.6), "sensor.force_noise": 1.2}
 SIMULATED = {"world.friction": (0.1, 0.3), "sensor.force_noise": 0.3}
 
@@ -33,7 +34,7 @@ def outcomes(folder: Path, offsets: list[float] | None, physics: dict[str, Any],
     start = {"uniform": [-REACH_M, REACH_M]} if offsets is None else {"values": offsets}
     done = Campaign(
         world="valley", robot="free_tool", skills=[str(folder / "push.skill.json")], trials=trials, seed=seed,
-        duration_s=6.0, vary={"start.offset_x": start, "world.friction": {"uniform": [low, high]}},
+        duration_s=DURATION_S, vary={"start.offset_x": start, "world.friction": {"uniform": [low, high]}},
         set={"sensor.force_noise": physics["sensor.force_noise"]},
     ).run(folder / f"results{seed}")  # fmt: skip
     rows = sorted(done.rows, key=lambda row: row["trial"])

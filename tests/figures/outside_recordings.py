@@ -182,12 +182,12 @@ class Learned(NamedTuple):
 
     @property
     def slides(self) -> bool:
-        """Whether it is a push along -z that is free along x, to the 15 degrees to which `learn` names axes.
+        """Whether it is a push along -z that is free along x, as far as `learn` says that it knows the push.
 
-        One slide to one side leaves the push open, which is as right where what is open covers -z.
+        One slide to one side leaves it open. It names axes to 15 degrees.
         """
-        said = re.search(r"the push is open: up to (\d+) degrees", self.said)
-        most = float(said[1]) if said else 15.0
+        said = re.search(r"the push is (?:open: up|known) to (?:about )?(\d+) degrees", self.said)
+        most = max(15.0, float(said[1])) if said else 15.0
         along = np.linalg.norm(self.free @ np.array([[1.0], [0.0], [0.0]]), axis=1)
         return self.off([0, 0, -1]) < most and bool(np.any(along > np.cos(np.radians(most))))
 

@@ -128,7 +128,14 @@ def is_ambiguous(part: Learned, whole: float) -> bool:
 
 
 def _sideways(part: Learned, direction: Float) -> Float:
-    return part.means - (part.means @ direction)[:, None] * direction
+    """Mean motion (n, 3) of each demonstration across a push, in contact where it touched."""
+    means = part.means.copy()
+    for i in range(len(means)):
+        assert part.pieces is not None
+        touched = some(part.pieces, part.pieces.contact & (part.pieces.demonstration == i))
+        if len(touched.length):
+            means[i] = touched.length @ touched.motion / touched.length.sum()
+    return means - (means @ direction)[:, None] * direction
 
 
 def _other_side(part: Learned) -> Float:

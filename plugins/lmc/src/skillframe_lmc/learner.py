@@ -41,7 +41,7 @@ from skillframe_lmc.intervals import Motion, Track
 from skillframe_lmc.phase import Stop
 from skillframe_lmc.pieces import Pieces, pushed, some, turned, until_left, whole_witness
 from skillframe_lmc.posterior import PUSH_EXISTS, TURN_EXISTS, Choice, decide, witnesses
-from skillframe_lmc.press import LEANING, Press, presses
+from skillframe_lmc.press import Press, contradiction, presses
 from skillframe_lmc.sectors import concatenated, sectors
 from skillframe_lmc.settings import LEVER_M, Settings
 from skillframe_lmc.work import Work, work
@@ -117,7 +117,7 @@ def _translation(
     return Learned(
         name="translation", motions=motions, moving=moving, pieces=shown, work=done, choice=choice, axes=axes,
         means=means, speed=_speed(moving), pressed=() if stood is None else stood.presses, told=told,
-        press_off=0.0 if found is None or stood is not None or choice is None else _press_off(found, choice),
+        press_off=0.0 if found is None or stood is not None else contradiction(found, choice),
         one_motion=_one_motion("translation", moving, shown, choice, settings),
     )  # fmt: skip
 
@@ -193,15 +193,6 @@ class _Standing(NamedTuple):
         """Mean directions (n, 3) of motions in contact of at least `least` [m]."""
         touched = [p.motion.displacement for p in self.presses]
         return np.array([unit(d).mean(axis=0) for d in touched if norm(d).sum() >= least]).reshape(-1, 3)
-
-
-def _press_off(found: Sequence[Press], choice: Choice) -> float:
-    """Angle [rad] of the standing force to the push of the motion, 0 within the plateau and a teacher's lean."""
-    if choice.direction is None:
-        return 0.0
-    stood = unit(np.sum([unit(p.votes.mean(axis=0)) for p in found], axis=0))
-    off = float(np.arccos(np.clip(stood @ choice.direction, -1.0, 1.0)))
-    return off if off > choice.half_width + LEANING else 0.0
 
 
 def _standing(found: list[Press], moved: Choice | None) -> _Standing | None:

@@ -32,6 +32,7 @@ from numpy.typing import NDArray
 
 from skillframe.frames import Float, norm, unit
 from skillframe_lmc.intervals import BLOCK_S, Motion, Track, moving_blocks, touching
+from skillframe_lmc.posterior import Choice
 from skillframe_lmc.sectors import Sectors, sectors
 
 LEAST_STANDING, VOTE_S = 0.5, 0.1  # s
@@ -87,6 +88,15 @@ def presses(tracks: Sequence[Track], motions: Sequence[Motion]) -> list[Press] |
     """Standing force of every demonstration, or None if one was not pressed."""
     found = [p for track, motion in zip(tracks, motions, strict=True) if (p := press(track, motion)) is not None]
     return found if found and len(found) == len(tracks) else None
+
+
+def contradiction(found: Sequence[Press], moved: Choice | None) -> float:
+    """Angle [rad] of the standing force to the push of the motion; 0 without one, or within its plateau and a lean."""
+    if moved is None or moved.direction is None:
+        return 0.0
+    stood = unit(np.sum([unit(p.votes.mean(axis=0)) for p in found], axis=0))
+    off = float(np.arccos(np.clip(stood @ moved.direction, -1.0, 1.0)))
+    return off if off > moved.half_width + LEANING else 0.0
 
 
 def press(track: Track, motion: Motion) -> Press | None:
