@@ -91,7 +91,7 @@ def presses(tracks: Sequence[Track], motions: Sequence[Motion]) -> list[Press] |
 
 
 def contradiction(found: Sequence[Press], moved: Choice | None) -> float:
-    """Angle [rad] of the standing force to the push of the motion; 0 without one, or within its plateau and a lean."""
+    """Angle [rad] of the standing force to the push of the motion, 0 without one or within its plateau and a lean."""
     if moved is None or moved.direction is None:
         return 0.0
     stood = unit(np.sum([unit(p.votes.mean(axis=0)) for p in found], axis=0))
