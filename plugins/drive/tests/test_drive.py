@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from dataclasses import fields, replace
 
@@ -253,6 +254,29 @@ def test_the_command_line_refuses_what_it_cannot_use(tmp_path, capsys, valley_sk
         assert run(words) == 2
         said = capsys.readouterr().err
         assert sentence in said and said.count("error") == 1, said
+
+
+def test_a_run_is_entered_as_the_next_real_trial(valley_skill, tmp_path, monkeypatch, capsys):
+    from skillframe.cli.main import run
+
+    written, bench = tmp_path / "cell.toml", tmp_path / "bench"
+    written.write_text('robot = "fr3"\nlink = "direct_torque"\nhost = "h"\nworld = "valley"\nwitness = "person"\n')
+    monkeypatch.setattr("skillframe_drive.runs.open_link", lambda cell: linked("fr3", arm("fr3")))
+    words = ["drive", "run", str(valley_skill), "--cell", str(written), "--duration", "0.2", "--enter", str(bench)]
+    for more, sentence in ((["--dry"], "a dry run is no trial"), ([], "not confirmed")):
+        monkeypatch.setattr("sys.stdin", io.StringIO("no\n"))
+        assert run([*words, *more]) == 2 and sentence in capsys.readouterr().err
+    assert run([*words[:-2], "--samples", "a=1"]) == 2 and "--enter TABLE" in capsys.readouterr().err
+    assert not bench.exists()
+    for answer, code, offset in (("y", 0, "0"), ("n", 1, "0.004")):
+        monkeypatch.setattr("sys.stdin", io.StringIO(f"move\n{answer}\n"))
+        assert run([*words, "--samples", f"fixture.offset_x={offset}"]) == code
+    rows = (bench / "results.csv").read_text().splitlines()
+    assert rows[0] == "trial,skill,success,failure,fixture.offset_x,source"
+    assert rows[1:] == ["0,valley,1,,0.0,real", "1,valley,0,the person says that it is not done,0.004,real"]
+    monkeypatch.setattr("sys.stdin", io.StringIO("move\ny\n"))
+    assert run([*words, "--samples", "offset=1"]) == 2  # other samples than the table's
+    assert len((bench / "results.csv").read_text().splitlines()) == 3
 
 
 def test_a_cell_file_is_read(tmp_path):

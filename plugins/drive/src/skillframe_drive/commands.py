@@ -75,12 +75,13 @@ def _print(lines: Any) -> None:
 @click.option("--press", is_flag=True, help="First check the wrench by three presses of your hand, as check does.")
 @click.option("--dry", is_flag=True, help="Read and compute, but send nothing to the robot.")
 @click.option("--duration", default=60.0, show_default=True, type=click.FloatRange(0.1), help="Longest run [s].")
-@click.option("--rate", default=100.0, show_default=True, type=float, help="Rate of the trace [Hz].")
 @click.option("--out", type=click.Path(path_type=Path), help="Trace file (.npz), for report, replay and video.")
+@click.option("--enter", type=CELL, metavar="TABLE", help="Enter the run as the next trial, as trials enter does.")
+@click.option("--samples", multiple=True, metavar="NAME=VALUE", help="What was set for this trial, for --enter.")
 @click.option("--json", "as_json", is_flag=True, help="The outcome as JSON on stdout.")
 def run(
-    skill: str, cell: Path, coc: str | None, slow: float, press: bool, dry: bool, duration: float, rate: float,
-    out: Path | None, as_json: bool,
+    skill: str, cell: Path, coc: str | None, slow: float, press: bool, dry: bool, duration: float,
+    out: Path | None, enter: Path | None, samples: tuple[str, ...], as_json: bool,
 ) -> int:  # fmt: skip
     """Run SKILL once on the robot of a cell.
 
@@ -90,13 +91,19 @@ def run(
     \b
     Example:
       skillframe drive run valley.skill.json --cell cell.toml --slow 0.5 --out run.npz
+      skillframe drive run valley.skill.json --cell cell.toml --enter bench --samples fixture.offset_x=0.004
     """
     from skillframe import LearnedSkill
+    from skillframe.cli.main import run as typed
     from skillframe_drive.cell import load_cell
     from skillframe_drive.press import check_wrench
     from skillframe_drive.runs import check as measured
     from skillframe_drive.runs import load_task, open_link, refuse_problems, run_once
 
+    if samples and enter is None:
+        raise click.UsageError("--samples is of a trial that is entered: give --enter TABLE")
+    if enter is not None:
+        _refuse_entering(dry)
     learned, task = LearnedSkill.load(skill), load_task(load_cell(cell))
     link = open_link(task.cell)
     try:
@@ -109,7 +116,7 @@ def run(
         if not dry:
             _confirm()
         done = run_once(
-            learned, task, link, coc=coc, slow=slow, dry=dry, duration_s=duration, rate_hz=rate,
+            learned, task, link, coc=coc, slow=slow, dry=dry, duration_s=duration, rate_hz=100.0,
             done=partial(click.confirm, "Is the task done?", err=True) if task.cell.witness == "person" else None,
         )  # fmt: skip
     finally:
@@ -124,9 +131,26 @@ def run(
         click.echo("success" if done.success else f"failure: {done.failure}")
         click.echo(f"  ended after {done.duration_s:.2f} s ({done.reason}); peak force {done.peak_force_n:.1f} N")
         click.echo(f"  {meta['notes'][-2]}")
+    entered = 0
+    if enter is not None:
+        outcome = ["--success"] if done.success else ["--failure", "--why", str(done.failure)]
+        given = [word for each in samples for word in ("--samples", each)]
+        name = Path(skill).name.removesuffix(".skill.json")
+        entered = typed(["trials", "enter", str(enter), "--skill", name, *outcome, *given])
     if done.interrupted:
         raise KeyboardInterrupt
-    return 0 if done.success else 1
+    return entered or (0 if done.success else 1)
+
+
+def _refuse_entering(dry: bool) -> None:
+    """Refuse before the robot moves what cannot be entered."""
+    from skillframe.errors import InputError
+
+    if dry:
+        raise click.UsageError("a dry run is no trial: leave out --dry or --enter")
+    root = click.get_current_context().find_root()
+    if not isinstance(root.command, click.Group) or root.command.get_command(root, "trials") is None:
+        raise InputError("--enter", "needs the command trials", "install skillframe-certify")
 
 
 @command.command()

@@ -244,7 +244,7 @@ def read_runs(paths: Sequence[Path], box: Box) -> dict[str, Trace]:
         if run.meta.get("slow", 1.0) != 1.0 or run.meta.get("dry"):
             raise InputError(path, "was a slowed or a dry run", "run it at full speed: leave out --slow and --dry")
         if len(run.time) < 3 or float(np.median(np.diff(run.time))) > 0.02:
-            raise InputError(path, "has fewer than 50 samples a second", "leave out --rate")
+            raise InputError(path, "has fewer than 50 samples a second", "record it with drive run")
     return runs
 
 
