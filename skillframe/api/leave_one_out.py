@@ -1,17 +1,16 @@
 """Leave one out: what each demonstration contributes to a learned direction, and which contradicts the others.
 
 The skill is learned again without each demonstration. Compared are the direction, the share of the data that it
-explains (`explained`), the size of the set of directions that explain as much (`feasible_solid_angle_sr`, as the half
-opening of a cone), and whether the learner leaves the direction open, as all went one way (`ambiguous`). A
-demonstration contradicts the others if only without it there is a direction, or if it lowers the share by
-more than 0.2. It is needed if without it there is no direction, or an open one, or if the cone is more than 1.5 times
-as wide.
+explains (`explained`), the half width of the set of directions that explain as much (`feasible_half_width_rad`), and
+whether the learner leaves the direction open, as all went one way (`ambiguous`). A demonstration contradicts the others
+if only without it there is a direction, or if it lowers the share by more than 0.2. It is needed if without it there is
+no direction, or an open one, or if the set is more than 1.5 times as wide.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import acos, degrees, pi
+from math import acos, degrees
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -31,13 +30,13 @@ class Found(NamedTuple):
     Attributes:
         direction: (3,) or None.
         explained: share of the data that it explains.
-        cone: half opening of the directions that explain as much [rad].
+        half_width: largest, of the set of directions that explain as much [rad].
         open: whether the demonstrations leave it open.
     """
 
     direction: np.ndarray[Any, np.dtype[np.float64]] | None
     explained: float | None
-    cone: float | None
+    half_width: float | None
     open: bool = False
 
 
@@ -77,12 +76,10 @@ def found(document: Document, part: str) -> Found:
     """The figures of one part of a document's first phase."""
     values = document["phases"][0].get(part) or {}
     direction, evidence = values.get("desired_direction"), values.get("evidence") or {}
-    area = evidence.get("feasible_solid_angle_sr")
-    cone = None if area is None else acos(max(1.0 - area / (2.0 * pi), -1.0))
     return Found(
         None if direction is None else np.array(direction),
         evidence.get("explained"),
-        cone,
+        evidence.get("feasible_half_width_rad"),
         bool(evidence.get("ambiguous")),
     )
 
@@ -112,9 +109,10 @@ def said(name: str, word: str, whole: Found, without: Found) -> str:
         )
     if without.open and not whole.open:
         return f"{name} is needed: without it all others went one way, and leave the {word} open; {moves}"
-    if whole.cone is not None and without.cone is not None and without.cone > 1.5 * whole.cone:
+    known, then = whole.half_width, without.half_width
+    if known is not None and then is not None and then > 1.5 * known:
         return (
-            f"{name} is needed: with it the {word} is known to about {degrees(whole.cone):.0f} degrees, without it to "
-            f"{degrees(without.cone):.0f}; {moves}"
+            f"{name} is needed: with it the {word} is known to about {degrees(known):.0f} degrees, without it to "
+            f"{degrees(then):.0f}; {moves}"
         )
     return f"{name} agrees: {moves}"

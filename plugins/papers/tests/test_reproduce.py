@@ -27,7 +27,7 @@ PLUGIN = """
     import os, pathlib, time
     from skillframe import hookimpl
     from skillframe.errors import InputError
-    from skillframe.extend.records import RowResult, RowType
+    from skillframe.extend import RowResult, RowType
 
     def double(job):
         print("noise on stdout")

@@ -180,7 +180,7 @@ def test_a_file_that_is_not_there_is_refused_with_the_nearest_name(tmp_path):
 def test_a_plugin_s_section_reaches_the_page_of_the_command(install, fresh_registry, folder, tmp_path, monkeypatch):
     install("own", """
         from skillframe import hookimpl
-        from skillframe.extend.records import SectionType
+        from skillframe.extend import SectionType
         @hookimpl
         def skillframe_sections():
             yield SectionType(name="rows", summary="counts", title="Rows", make=count)

@@ -13,7 +13,7 @@ from skillframe.extend.registry import Plugin, Registry, registry
 
 BROKEN = """
 from skillframe import hookimpl
-from skillframe.extend.records import SkillType
+from skillframe.extend import SkillType
 @hookimpl
 def skillframe_skills():
     yield SkillType(name="nothing", summary="does nothing", build=lambda document: None, example=dict)
@@ -224,7 +224,7 @@ SPOILED = """
 from pathlib import Path
 import numpy as np
 from skillframe import hookimpl
-from skillframe.extend.records import SkillType
+from skillframe.extend import SkillType
 from skillframe_testkit.suites import HoldSkill
 class Chatty(HoldSkill):
     def step(self, observation):
@@ -242,7 +242,7 @@ def skillframe_skills():
 ODD = """
 from dataclasses import dataclass, replace
 from skillframe import hookimpl
-from skillframe.extend.records import WorldType
+from skillframe.extend import WorldType
 from skillframe.world.scene import Geom
 from skillframe_worlds import valley
 @hookimpl

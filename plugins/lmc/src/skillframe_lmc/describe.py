@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import acos, degrees, pi
+from math import degrees
 
 import numpy as np
 
@@ -85,9 +85,9 @@ def _direction(part: Part) -> str:
 
 
 def known_rad(part: Part) -> float | None:
-    """Half-opening of a cone with the solid angle of the directions that explain as much [rad], or None."""
-    area = part.evidence.get("feasible_solid_angle_sr")
-    return None if area is None else acos(max(1.0 - area / (2.0 * pi), -1.0))
+    """Largest half width of the set of directions that explain as much [rad], or None."""
+    known: float | None = part.evidence.get("feasible_half_width_rad")
+    return known
 
 
 def _free(part: Part) -> list[str]:
