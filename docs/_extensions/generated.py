@@ -1,11 +1,13 @@
-"""Tables that pages of the docs are filled with while they are built: the papers' results, and the changes of code.
+"""Tables that pages of the docs are filled with while they are built: results, changes of code, exported constants.
 
 A page holds the line `<!-- generated -->` where its table comes. Nothing is computed here: the first table is made of
-the verdicts that ship with `skillframe-papers`, the second of `tests/mutants/mutants.toml` and `caught.csv`.
+the verdicts that ship with `skillframe-papers`, the second of `tests/mutants/mutants.toml` and `caught.csv`, the third
+of the lists of names of the core's packages.
 """
 
 from __future__ import annotations
 
+import ast
 import csv
 import json
 import tomllib
@@ -16,6 +18,7 @@ from typing import Any, NamedTuple
 ROOT = Path(__file__).resolve().parents[2]
 MUTANTS, CAUGHT = (ROOT / "tests" / "mutants" / name for name in ("mutants.toml", "caught.csv"))
 ROWS = ROOT / "plugins" / "papers" / "src" / "skillframe_papers" / "reproduced" / "reproduce.json"
+STUBS = tuple(sorted((ROOT / "skillframe").glob("*/__init__.pyi")))
 MARK = "<!-- generated -->\n"
 
 
@@ -44,6 +47,40 @@ def _row(change: dict[str, Any], test: str) -> str:
     return f"| `{Path(change['file']).name}` | {change['what']}{' (s)' if change.get('survived') else ''} | {by} |"
 
 
+def constants() -> str:
+    """The constants and types that packages of the core export, which autodoc does not find there."""
+    rows = ["| package | name | what it is |", "|---|---|---|"]
+    for stub in STUBS:
+        package = stub.parent
+        for node in ast.parse(stub.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ImportFrom) and node.module:
+                found = _assigned(package / f"{node.module.replace('.', '/')}.py")
+                rows += [
+                    f"| `skillframe.{package.name}` | `{each.name}` | {found[each.name]} |"
+                    for each in node.names
+                    if each.name in found
+                ]
+    return "\n".join(rows) + "\n"
+
+
+def _assigned(module: Path) -> dict[str, str]:
+    """Names that a module assigns at its top, with the text below each, or with its comment `#:`."""
+    if not module.exists():  # a package
+        return {}
+    source = module.read_text(encoding="utf-8")
+    lines, body, found = source.splitlines(), ast.parse(source).body, dict[str, str]()
+    for node, below in zip(body, [*body[1:], None], strict=True):
+        if isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            line, before = lines[node.lineno - 1], lines[node.lineno - 2]
+            text = line.partition("#: ")[2] or (before.partition("#: ")[2] if before.startswith("#: ") else "")
+            if not text and isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant):
+                text = " ".join(str(below.value.value).split())
+            names = [each.id for target in targets for each in ast.walk(target) if isinstance(each, ast.Name)]
+            found |= dict.fromkeys(names, text.replace("|", "\\|"))
+    return found
+
+
 class Table(NamedTuple):
     """What makes a page's table, and the files that it reads."""
 
@@ -54,6 +91,7 @@ class Table(NamedTuple):
 TABLES = {
     "explanation/reproduced": Table(reproduced, (ROWS,)),
     "evidence/mutants": Table(caught, (MUTANTS, CAUGHT)),
+    "reference/api": Table(constants, STUBS),
 }
 
 
