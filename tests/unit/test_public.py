@@ -117,6 +117,23 @@ def test_every_name_that_the_page_lists_exists_and_is_documented():
     assert not lacking
 
 
+def test_the_page_s_table_has_every_constant_and_type_that_a_package_exports_and_says_what_it_is(monkeypatch):
+    monkeypatch.syspath_prepend(str(ROOT / "docs" / "_extensions"))
+    from generated import constants as table
+
+    cells = [line.strip("|").split(" | ") for line in table().splitlines()[2:]]
+    listed = {(cell[0].strip(" `"), cell[1].strip("`")) for cell in cells}
+    assert all(cell[2].strip() for cell in cells)
+    packages = {stub.parent.name for stub in ROOT.glob("skillframe/*/__init__.pyi")}
+    for package in sorted(packages):
+        module = importlib.import_module(f"skillframe.{package}")
+        values = {name: getattr(module, name) for name in module.__all__}
+        plain = {
+            n for n, v in values.items() if not (inspect.isroutine(v) or inspect.isclass(v) or inspect.ismodule(v))
+        }
+        assert {name for where, name in listed if where == f"skillframe.{package}"} >= plain
+
+
 def test_no_module_stands_on_the_page_twice():
     names = [module for module, _ in MODULES]
     assert len(names) == len(set(names))

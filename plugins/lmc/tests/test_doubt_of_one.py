@@ -6,6 +6,7 @@ import re
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from skillframe_lmc.advice import GOOD, LIMP, OTHER_SIDE, STILL, advice
 
 from skillframe.demonstration.record import Demonstration
@@ -101,6 +102,20 @@ def test_a_slide_after_an_approach_is_not_doubted(seed: int, tmp_path) -> None:
     each = slide(seed)
     each.write(str(tmp_path / "slide.csv"))
     assert "doubtful" not in said(read_demonstration(tmp_path / "slide.csv", wrench_frame=each.frame))[1]
+
+
+def test_a_slide_whose_force_shows_on_half_of_its_way_is_open() -> None:
+    """Approach and leaving, which are not in contact, say nothing of the side to which it slid."""
+    time = np.arange(0.0, 7.5, 0.001)
+    up = 0.12 * (1.0 - eased((time - 0.5) / 2.0)) + 0.05 * eased((time - 6.0) / 1.2)
+    position = np.stack([0.4 + 0.08 * eased((time - 3.0) / 3.0), 0.0 * time, up], axis=1)
+    bump = np.exp(-(((time - 4.2) / 0.5) ** 2)) * (time > 2.5) * (time < 6.0)
+    force = np.round(np.outer(bump, [-2.18, 0.7, 11.0]) / 0.009) * 0.009
+    angle = np.radians(20.0) * eased((time - 0.5) / 5.5)
+    turned = Rotation.from_rotvec(np.outer(angle, [0.0, 1.0, 0.3])) * Rotation.from_euler("x", np.pi)
+    wrench = np.concatenate([force, np.cross(turned.apply([0.0, 0.0, 0.02]), force)], axis=1)
+    d = Demonstration(time=time, position=position, quaternion=turned.as_quat(), wrench=wrench, source="slide")
+    assert said(d)[1].startswith("the push is open")
 
 
 def test_a_long_slide_after_a_short_approach_is_not_doubted() -> None:
