@@ -263,7 +263,8 @@ def test_a_run_is_entered_as_the_next_real_trial(valley_skill, tmp_path, monkeyp
     written.write_text('robot = "fr3"\nlink = "direct_torque"\nhost = "h"\nworld = "valley"\nwitness = "person"\n')
     monkeypatch.setattr("skillframe_drive.runs.open_link", lambda cell: linked("fr3", arm("fr3")))
     words = ["drive", "run", str(valley_skill), "--cell", str(written), "--duration", "0.2", "--enter", str(bench)]
-    for more, sentence in ((["--dry"], "a dry run is no trial"), ([], "not confirmed")):
+    refused = "slowed run is no trial"
+    for more, sentence in ((["--dry"], refused), (["--slow", "0.5"], refused), ([], "not confirmed")):
         monkeypatch.setattr("sys.stdin", io.StringIO("no\n"))
         assert run([*words, *more]) == 2 and sentence in capsys.readouterr().err
     assert run([*words[:-2], "--samples", "a=1"]) == 2 and "--enter TABLE" in capsys.readouterr().err
@@ -276,7 +277,19 @@ def test_a_run_is_entered_as_the_next_real_trial(valley_skill, tmp_path, monkeyp
     assert rows[1:] == ["0,valley,1,,0.0,real", "1,valley,0,the person says that it is not done,0.004,real"]
     monkeypatch.setattr("sys.stdin", io.StringIO("move\ny\n"))
     assert run([*words, "--samples", "offset=1"]) == 2  # other samples than the table's
+    assert (
+        f"type: skillframe trials enter {bench} --skill valley --success --samples offset=1" in capsys.readouterr().err
+    )
     assert len((bench / "results.csv").read_text().splitlines()) == 3
+
+
+def test_without_the_command_trials_a_run_that_is_to_be_entered_does_not_begin(valley_skill, monkeypatch, capsys):
+    from skillframe.cli.main import cli, run
+
+    real = cli.get_command
+    monkeypatch.setattr(cli, "get_command", lambda ctx, name: None if name == "trials" else real(ctx, name))
+    assert run(["drive", "run", str(valley_skill), "--cell", "none.toml", "--enter", "bench"]) == 2
+    assert "install skillframe-certify" in capsys.readouterr().err
 
 
 def test_a_cell_file_is_read(tmp_path):

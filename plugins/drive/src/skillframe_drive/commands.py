@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shlex
 import time
 from functools import partial
 from pathlib import Path
@@ -103,7 +104,7 @@ def run(
     if samples and enter is None:
         raise click.UsageError("--samples is of a trial that is entered: give --enter TABLE")
     if enter is not None:
-        _refuse_entering(dry)
+        _refuse_entering(dry, slow)
     learned, task = LearnedSkill.load(skill), load_task(load_cell(cell))
     link = open_link(task.cell)
     try:
@@ -136,18 +137,20 @@ def run(
         outcome = ["--success"] if done.success else ["--failure", "--why", str(done.failure)]
         given = [word for each in samples for word in ("--samples", each)]
         name = Path(skill).name.removesuffix(".skill.json")
-        entered = typed(["trials", "enter", str(enter), "--skill", name, *outcome, *given])
+        words = ["trials", "enter", str(enter), "--skill", name, *outcome, *given]
+        if entered := typed(words):
+            click.echo(f"this run is not entered yet; put right and type: skillframe {shlex.join(words)}", err=True)
     if done.interrupted:
         raise KeyboardInterrupt
     return entered or (0 if done.success else 1)
 
 
-def _refuse_entering(dry: bool) -> None:
+def _refuse_entering(dry: bool, slow: float) -> None:
     """Refuse before the robot moves what cannot be entered."""
     from skillframe.errors import InputError
 
-    if dry:
-        raise click.UsageError("a dry run is no trial: leave out --dry or --enter")
+    if dry or slow != 1.0:
+        raise click.UsageError("a dry or slowed run is no trial of the skill: leave out --dry and --slow, or --enter")
     root = click.get_current_context().find_root()
     if not isinstance(root.command, click.Group) or root.command.get_command(root, "trials") is None:
         raise InputError("--enter", "needs the command trials", "install skillframe-certify")
