@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,8 @@ from skillframe_lmc import intervals
 from skillframe_lmc.describe import describe
 from skillframe_lmc.intervals import track
 from skillframe_lmc.learner import learn
-from skillframe_lmc.press import Press, presses
+from skillframe_lmc.posterior import Choice
+from skillframe_lmc.press import Press, contradiction, presses
 from skillframe_lmc.settings import Settings
 from synthetic import valley
 
@@ -225,3 +227,14 @@ def test_a_direction_that_no_motion_took_is_open_and_asks_for_the_other_side(
     assert "sure: the push is open: up to" in said
     assert "next: add a demonstration from the other side, going towards -x" in said
     assert "open" not in translation(learn(valley(45.0, 0.2), LearnOptions()))["evidence"]["message"]
+
+
+@pytest.mark.parametrize(("degrees_off", "contradicts"), [(23.0, False), (27.0, True)])
+def test_a_standing_force_contradicts_a_push_beyond_its_half_width_and_the_lean_of_a_hand(degrees_off, contradicts):
+    """20 degrees and 5."""
+    off = np.radians(degrees_off)
+    votes = np.tile([np.sin(off), 0.0, -np.cos(off)], (5, 1))
+    stood = SimpleNamespace(votes=votes)
+    push = Choice(np.array([0.0, 0.0, -1.0]), 0.9, 0.3, np.radians(20.0))
+    assert contradiction([stood], push) == pytest.approx(off if contradicts else 0.0)
+    assert contradiction([stood], None) == contradiction([stood], push._replace(direction=None)) == 0.0
