@@ -22,7 +22,6 @@ from skillframe_lmc.work import Work
 Name = Literal["translation", "rotation"]
 OPEN_HALF_WIDTH = radians(20.0)
 ONE_WAY = radians(20.0)  # rms angle of sliding to its mean; a floor and a ramp have 25
-ONE_SIDED = 0.8  # |sum| / sum of |.| of the sideways means: 1 if all lean one way, 0 if they balance
 SIDEWAYS = 0.15  # a smaller sideways mean is wandering
 MOST_DRAWN = 30
 NO_TORQUE = "no torque was measured, so the turn is that of the motion, whoever turned the tool"
@@ -119,29 +118,23 @@ def is_ambiguous(part: Learned, whole: float) -> bool:
     if part.pieces is None or not part.pieces.contact.any():
         return False
     seen = witnesses(some(part.pieces, part.pieces.contact), whole)
-    mean = unit(seen.weight @ seen.pieces.motion)
-    apart = np.arccos(np.clip(seen.pieces.motion @ mean, -1.0, 1.0))
+    apart = np.arccos(np.clip(seen.pieces.motion @ unit(seen.weight @ seen.pieces.motion), -1.0, 1.0))
     spread = float(np.sqrt(seen.weight @ apart**2 / seen.weight.sum()))
-    aside = _sideways(part, choice.direction)
-    lean = norm(aside)
-    return bool(spread <= ONE_WAY and lean.max() >= SIDEWAYS and norm(aside.sum(axis=0)) > ONE_SIDED * lean.sum())
+    return spread <= ONE_WAY and float(norm(_sideways(part, choice.direction))) >= SIDEWAYS
 
 
 def _sideways(part: Learned, direction: Float) -> Float:
-    """Mean motion (n, 3) of each demonstration across a push, in contact where it touched."""
-    means = part.means.copy()
-    for i in range(len(means)):
-        assert part.pieces is not None
-        touched = some(part.pieces, part.pieces.contact & (part.pieces.demonstration == i))
-        if len(touched.length):
-            means[i] = touched.length @ touched.motion / touched.length.sum()
-    return means - (means @ direction)[:, None] * direction
+    """Mean motion (3,) in contact across a push."""
+    assert part.pieces is not None
+    touched = some(part.pieces, part.pieces.contact)
+    mean: Float = touched.length @ touched.motion / touched.length.sum()
+    return mean - (mean @ direction) * direction
 
 
 def _other_side(part: Learned) -> Float:
     """Unit vector (3,) across the push, along which a demonstration from the other side would move."""
     assert part.direction is not None
-    return -unit(_sideways(part, part.direction).sum(axis=0))
+    return -unit(_sideways(part, part.direction))
 
 
 def _message(part: Learned, settings: Settings, open_direction: bool) -> str:
