@@ -31,6 +31,7 @@ from skillframe.demonstration.record import Demonstration
 from skillframe.frames import Float
 from skillframe.world.scene import Scene
 from tests.figures import bayonets
+from tests.figures.worth_ablations import ablated
 from tests.figures.worth_families import FAMILIES, FLOORS, KINDS, LONGER_S, SHORT, demonstrations, drawn
 from tests.figures.worth_methods import document_of, hand_written, lmc_row, played, pushes
 from tests.figures.worth_runs import EACH, executed, side_by_side, table
@@ -44,13 +45,15 @@ TUNING = [(k, with_force) for k in (500.0, 1000.0, 2000.0, 4000.0) for with_forc
 
 
 def rows_of_set(
-    shown: dict[str, list[Demonstration]], turn: Float, scene: Scene, learners: Sequence[str]
+    shown: dict[str, list[Demonstration]], turn: Float, scene: Scene, learners: Sequence[str], ablations: bool = False
 ) -> dict[str, Row]:  # fmt: skip
     """Every method by "person|method"."""
     rows: dict[str, Row] = {f"|{name}": row for name, row in hand_written(turn, scene.task).items()}
     for kind, given in shown.items():
         taught = pushes(given)
         rows |= {f"{kind}|{name}": taught[name] for name in (OF_SHAKY if kind == SHAKY else taught)}
+        if ablations:
+            rows |= {f"{kind}|{name}": row for name, row in ablated(given, taught["LMC"]).items()}
         if kind in learners:
             rows |= {f"{kind}|{n}": r for n, r in played(given, PLAYED, rows[f"{kind}|LMC"].stiffness).items()}
         for count in (1, 2) if kind == FEW else ():
@@ -75,17 +78,19 @@ def tuning_rows(shown: dict[str, list[Demonstration]]) -> dict[str, Row]:
 
 def run_set(
     family: str, seed: int, kinds: Sequence[str], learners: Sequence[str], tune: bool = False,
-    methods: Sequence[str] | None = None,
+    methods: Sequence[str] | None = None, ablations: bool = False,
 ) -> Any:  # fmt: skip
     """One instance: for each person and method, whether each run reached the goal, the run in place last."""
     scene, turn, rng = drawn(family, seed)
     floors = FLOORS.get(family, SHORT)
     shown, failed = demonstrations(scene, turn, rng, kinds, EACH, floors)
-    rows = tuning_rows(shown) if tune else rows_of_set(shown, turn, scene, learners)
+    rows = tuning_rows(shown) if tune else rows_of_set(shown, turn, scene, learners, ablations)
     if methods:
-        rows = {key: row for key, row in rows.items() if key.split("|")[1] in methods}
-    done = executed(scene, rows, turn, rng, seed, LONGER_S.get(family, LONGEST), floors)
-    return {"family": family, "seed": seed, "failed": failed, "results": done}
+        rows = {k: row for k, row in rows.items() if (name := k.split("|")[1]) in methods or name.startswith("without")}
+    unlike = {key: row for key, row in rows.items() if next(k for k in rows if rows[k] is row) == key}
+    done = executed(scene, unlike, turn, rng, seed, LONGER_S.get(family, LONGEST), floors)
+    results = {key: done[next(k for k in unlike if rows[k] is row)] for key, row in rows.items()}
+    return {"family": family, "seed": seed, "failed": failed, "results": results}
 
 
 def directions(seed: int, family: str, kinds: Sequence[str]) -> list[str]:
@@ -106,7 +111,7 @@ def one(family: str, seed: int, args: argparse.Namespace) -> dict[str, Any]:
     """A set of any family, as `run_set`."""
     if family == "bayonet":
         return bayonets.run_set(seed)
-    return run_set(family, seed, args.kinds, args.learners, args.tune, args.methods)
+    return run_set(family, seed, args.kinds, args.learners, args.tune, args.methods, args.ablations)
 
 
 def sets_of(families: Sequence[str], args: argparse.Namespace) -> list[dict[str, Any]]:
@@ -138,6 +143,7 @@ def main(given: Sequence[str]) -> None:
     parser.add_argument("--kinds", nargs="+", default=PEOPLE, choices=KINDS)
     parser.add_argument("--learners", nargs="*", default=[FEW], help="kinds of people whom learners of motions see")
     parser.add_argument("--methods", nargs="+", help="names of the rows to run; all if left out")
+    parser.add_argument("--ablations", action="store_true", help="LMC without each of its rules as well")
     parser.add_argument("--directions", action="store_true", help="of humps: only what is learned, nothing executed")
     parser.add_argument("--tune", action="store_true", help="only played methods, with every stiffness")
     parser.add_argument("--workers", type=int, default=1)

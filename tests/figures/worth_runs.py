@@ -129,7 +129,7 @@ def _led(task: str, results: Sequence[dict[str, Any]], person: str) -> list[str]
     sets = {key.split("|")[1]: [each[key] for each in results if key in each] for key in keys}
     if not person or "LMC" not in sets:
         return []
-    nulls = {name: given for name, given in sets.items() if name not in NOT_NULLS}
+    nulls = {name: given for name, given in sets.items() if name not in NOT_NULLS and not name.startswith("without")}
     best = max(nulls, key=lambda name: _whole(nulls[name]) / len(nulls[name]))
     low, high = clopper_pearson(_whole(sets["LMC"]), len(sets["LMC"]))
     least, most = clopper_pearson(_whole(nulls[best]), len(nulls[best]))
