@@ -47,9 +47,9 @@ def command(name: str | None, as_json: bool) -> None:
                 click.echo(f"  {kind:<13} {', '.join(names)}")
             if row["error"]:
                 click.echo(f"  error         {row['error']}")
-        note("skillframe plugins NAME says what one is, and what can be set")
+        note("skillframe plugins NAME shows what a world, drive, ... is, and what can be set")
     for each in known.not_installed:
-        click.echo(f"SKILLFRAME_PLUGINS names {each!r}, which is not installed", err=True)
+        click.echo(f"SKILLFRAME_PLUGINS names {each!r}, which is not installed; give names such as worlds", err=True)
     if known.unselected:
         click.echo(f"SKILLFRAME_PLUGINS leaves out {', '.join(known.unselected)}", err=True)
 

@@ -19,7 +19,7 @@ STROKES = ("c1", "c2", "c3", "s4")
 
 
 class Illustration(NamedTuple):
-    """One picture that explains a skill: a title, a caption, and the drawing as SVG text."""
+    """One picture: a title, a caption, and the drawing as SVG text with its `xmlns`, without which no page shows it."""
 
     title: str
     caption: str

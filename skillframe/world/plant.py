@@ -298,7 +298,7 @@ class Plant:
         return reading
 
     def contact_wrench(self, offset: Float) -> Float:
-        """True contact wrench (N, 6) on the tool at a point of the tool frame, base axes."""
+        """True contact wrench (N, 6) on the tool at a point of the tool frame, base axes, with any xfrc_applied."""
         raw = self._external[:, self._layout.tool]
         at_com = np.concatenate([raw[:, 3:], raw[:, :3]], axis=-1)
         pose = self.tool_pose()

@@ -63,7 +63,7 @@ QUANTITIES = (
              Range(1e-6, 100.0, "as a robot has mass, and no guess of it is a hundredfold off")),
     Quantity("robot.joint_friction", "N m", 0.0, "friction in each joint, which the controller does not know",
              Range(0.0, 1000.0, "more than the joints of large arms are driven with")),
-    Quantity("robot.payload", "kg", None, "mass that the robot truly carries, where its robot.toml has a [payload]",
+    Quantity("robot.payload", "kg", None, "mass that the robot truly carries, where its robot.toml has a table payload",
              Range(0.0, 20_000.0, "what the largest machines lift"), unfit=unfit_payload),
     Quantity("world.friction", "", None, "Coulomb coefficient of every contact; the world's own otherwise",
              Range(0.0, 5.0, "several times that of rubber on dry concrete")),

@@ -4,8 +4,6 @@
 
 The controller knows only the nominal robot: where masses or grasp vary, a second, nominal batch provides kinematics and
 dynamics. It controls a `Limb`: one arm, or the rows of several.
-
-The true plant of a batch, and the nominal one of the controller.
 """
 
 from __future__ import annotations
