@@ -29,9 +29,12 @@ import numpy as np
 
 from skillframe.errors import InputError
 from skillframe.frames import Float
-from skillframe.robot import ChainState, ClosedChain
+from skillframe.robot import ChainState, ClosedChain, OutOfReach
 from skillframe_hydraulics.law.symbolic_chain import Expression, SymbolicChain
 from skillframe_hydraulics.symbolic_or_numeric import maximum, square_sum
+
+WIDEST = 0.5
+"""Largest step of Newton's rule towards a place [rad or m]; longer ones turn a joint around."""
 
 
 def swung_by(chain: ClosedChain) -> bool:
@@ -99,17 +102,22 @@ class ToolTask:
         Raises:
             InputError: no convergence: out of reach or singular.
         """
-        z = np.array(start, dtype=float)
-        for _ in range(20):
-            state = chain.at(z, np.zeros(len(z)))
+        z, left = np.array(start, dtype=float), np.full(len(position), np.inf)
+        for _ in range(40):
+            try:
+                state = chain.at(z, np.zeros(len(z)))
+            except OutOfReach:
+                break
             left = position - self.position(state)
             if np.abs(left).max() < 1e-12:
                 return z
-            z = z + np.linalg.solve(self.jacobian(state), left)
+            step = np.linalg.solve(self.jacobian(state), left)
+            z = z + step * WIDEST / max(float(np.abs(step).max()), WIDEST)
         if np.abs(left).max() < 1e-9:
             return z
         place = ", ".join(f"{x:.3f}" for x in position)
-        raise InputError("task", f"the machine does not reach ({place})", "choose a nearer position or start")
+        fix = "choose a nearer start or workspace.fixture: skillframe robots ROBOT --check states the working range"
+        raise InputError("task", f"the machine does not reach ({place})", fix)
 
     def generalised(self, state: ChainState, force: Float) -> Float:
         """Generalised forces (n,) of a force (3,) of the environment on the tool, base axes."""
