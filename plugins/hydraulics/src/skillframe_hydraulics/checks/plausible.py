@@ -24,7 +24,7 @@ class Rule(NamedTuple):
         least, most: range of the figure, times `scale` if given.
         scale: computed from the other figures `needs`.
         says: text with {0} for the scaled figure, {1} for the range, and other figures by name; of: its unit.
-        refuses: False where an unusual figure may be deliberate.
+        refuses: False where an unusual figure may be deliberate; fix: what else than the unit may be wrong.
     """
 
     name: str
@@ -36,6 +36,7 @@ class Rule(NamedTuple):
     says: str = "where {1} are usual"
     of: str = ""
     refuses: bool = True
+    fix: str = ""
 
     def size(self, value: float, figures: Figures) -> float:
         """The value that the range applies to."""
@@ -111,7 +112,8 @@ MACHINE_RULES = (
     Rule("sensors.pressure", 100.0, 2e6, "Pa"),
     Rule("sensors.encoder", 1e-8, 0.02, "rad or m"),
     Rule("payload.mass", 0.0, 1.0, "kg", lambda p: 1.0 / p["link"], ("link",),
-         "which is {0} times the mass of the link that it is a part of"),
+         "which is {0} times the mass of the link that it is a part of",
+         fix="add the load to the mass of that link in the URDF, which is of part and load together"),
     Rule("limits.force_n", 0.05, 1e4, "N", lambda p: 1.0 / p["weight"], ("weight",), _OF_WEIGHT, refuses=False),
     Rule("limits.torque_rate_nm_s", 30.0, 1e9, "N m/s", lambda p: 1.0 / p["weight"], ("weight",),
          "which is {0} times that weight at a metre, a second, where {1} are usual", refuses=False),
@@ -136,6 +138,7 @@ def doubts(rules: tuple[Rule, ...], given: Mapping[str, object], where: str = ""
         size = f"{rule.size(value, known):.3g}{f' {own}' if own else ''}"
         problem = f"{rule.name}{where} is {value:g} {rule.unit}, {rule.says.format(size, usual, **known)}"
         likely = " or ".join(f'"{value:g} {word}"' for word in words)
-        fix = f"did you mean {likely}?" if words else "correct it if it is not meant"
+        unit = f"did you mean {likely}?" if words else "correct it if it is not meant"
+        fix = f"{rule.fix}; or {unit}" if rule.fix else unit
         yield Doubt(problem, fix, bool(words) and rule.refuses)
         known[rule.name] = value * UNITS[words[0]][1] if words else value
