@@ -21,7 +21,8 @@ from skillframe.robot import MISFIT, Actuation, ClosedChain, OutOfReach
 from skillframe_hydraulics.checks.figures import CYLINDER, is_motor, needed, relief, require_known
 from skillframe_hydraulics.checks.figures import areas as chamber_areas
 
-LEAST_ARM = 0.1  # m; below it, a piston force error of 1 kN has less than a third of its effect at mid stroke
+LEAST_ARM = 0.1  # m, or a sixth of the stroke: a force error of 1 kN has less than a third of its effect at mid stroke
+HELD = 0.75  # of an actuator's force; sound machines hold their load with 0.6, and one with 0.79 failed in the swing
 COVERED = 0.5  # share of a joint's range below which its cylinder's lengths are doubted; drawn ranges are often wide
 _NEEDED = ("bore", "rod", "stroke", "supply_pressure", "return_pressure")
 
@@ -84,15 +85,30 @@ def problems(chain: ClosedChain, z: Float) -> list[str]:
             far = f"it moves {turn:.3g} times as far as what moves it"
             found.append(f"the linkage of {name} is near its dead centre: {far}")
     found += _outside(chain, state.q)
-    for name, arm in zip(chain.actuated, np.abs(state.arms).max(axis=1), strict=True):
-        if name not in chain.independent and arm < LEAST_ARM:
-            found.append(f"{name} is near its dead centre: its moment arm is {arm:.3f} m, below {LEAST_ARM:g} m")
+    strokes = [float(a.known.get("stroke", math.inf)) for a in chain.robot.spec.actuation]
+    for name, arm, stroke in zip(chain.actuated, np.abs(state.arms).max(axis=1), strokes, strict=False):
+        least = min(LEAST_ARM, stroke / 6.0)
+        if name not in chain.independent and arm < least:
+            found.append(f"{name} is near its dead centre: its moment arm is {arm:.3f} m, below {least:.3g} m")
     if not found:
         spec = chain.robot.spec
         for actuation, force in zip(spec.actuation, state.holding_force(areas(spec.actuation) ** 2), strict=False):
             if actuation.fmu == CYLINDER or all(name in actuation.known for name in needed(actuation, _NEEDED)):
                 found += _overload(actuation, force, spec.folder / "robot.toml")
     return found
+
+
+def strained_actuators(chain: ClosedChain, z: Float) -> Iterator[str]:
+    """Sentences on actuators that use more than `HELD` of their force to hold their load at coordinates z (n,)."""
+    spec, state = chain.robot.spec, chain.at(z, np.zeros(len(z)))
+    for one, force in zip(spec.actuation, state.holding_force(areas(spec.actuation) ** 2), strict=True):
+        if any(name not in one.known for name in needed(one, _NEEDED)):
+            continue
+        limit = capacity(one)
+        most = limit.push if force > 0.0 else limit.pull
+        if abs(force) > HELD * most:
+            share = f"{100.0 * abs(force) / most:.0f} % of its force to hold its load"
+            yield f"at home {one.joint} needs {share}: a run may end in the swing, for want of force to move it"
 
 
 def require_feasible(chain: ClosedChain, z: Float) -> None:
@@ -146,6 +162,8 @@ def short_struts(chain: ClosedChain) -> Iterator[str]:
         joint = between.pop()
         low, high = (float(limit[model.joints[joint].idx_q]) for limit in (
             model.lowerPositionLimit, model.upperPositionLimit))  # fmt: skip
+        if high - low > 2.0 * math.pi - 0.01:  # drawn without limits: the cylinder limits it
+            continue
         q, spread = chain.home.copy(), np.linspace(low, high, 201)
         apart = []
         for value in spread:
