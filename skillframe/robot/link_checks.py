@@ -18,7 +18,7 @@ import json
 import math
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
@@ -142,15 +142,16 @@ class Problem:
     """A problem.
 
     Attributes:
-        code: fixed word for scripts; severity: "fatal" makes the robot unusable for dynamics.
-        where: link or joint; message: the problem; fix: what to do.
+        code: fixed word for scripts; severity: "fatal" makes the robot unusable for dynamics, "info" is no problem.
+        where: link or joint; message: the problem; fix: what to do; figures: those of the message, in SI, by name.
     """
 
     code: str
-    severity: Literal["fatal", "warning"]
+    severity: Literal["fatal", "warning", "info"]
     where: str
     message: str
     fix: str
+    figures: Mapping[str, float] = field(default_factory=dict)
 
 
 def cannot_run(message: str, fix: str) -> Problem:

@@ -38,7 +38,7 @@ def test_the_json_of_check_holds_what_the_contract_names(check):
     assert good == {"usable": True, "nq": 1, "nv": 1, "mass_kg": 2.5, "problems": []}
     code, bad, _ = check(HONEST.format(mass=1, moment=0.05))
     assert (code, bad["usable"]) == (1, False)
-    assert set(bad["problems"][0]) == {"code", "severity", "where", "message", "fix"}
+    assert set(bad["problems"][0]) == {"code", "severity", "where", "message", "fix", "figures"}
     assert bad["problems"][0]["severity"] == "fatal"
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from skillframe.errors import InputError, SkillframeError
 from skillframe.extend import unmapped_warnings
 from skillframe.robot import ClosedChain, Limits, Problem, RobotModel, cannot_run, warning
-from skillframe_hydraulics.checks.feasibility import problems, short_struts
+from skillframe_hydraulics.checks.feasibility import problems, short_struts, strained_actuators
 from skillframe_hydraulics.checks.figures import (
     CYLINDER,
     Unfit,
@@ -20,13 +20,17 @@ from skillframe_hydraulics.checks.figures import (
     unfit_machine,
 )
 from skillframe_hydraulics.checks.pumps import unfit_pumps
+from skillframe_hydraulics.checks.working_range import far_fixture, working_figures
 from skillframe_hydraulics.cylinder.bank import foreign_specs
 from skillframe_hydraulics.declared import fast_filters, gains_of, noise_of, require_declared
 from skillframe_hydraulics.law.hydraulic import tool_task
 
 
 def machine_warnings(robot: RobotModel) -> Iterator[Problem]:
-    """Impossible, unusual or missing cylinder figures, open loops, a bad home, and limits made for arms."""
+    """Impossible, unusual or missing cylinder figures, open loops, a bad home, and limits made for arms.
+
+    What a machine that can stand at home reaches and pushes with follows as "info".
+    """
     spec = robot.spec
     unused = [a.unused for a in spec.actuation if a.fmu != CYLINDER]
     yield from unmapped_warnings(foreign_specs(spec), unused, spec.folder)
@@ -56,9 +60,10 @@ def machine_warnings(robot: RobotModel) -> Iterator[Problem]:
     try:
         chain = ClosedChain(robot)
         z = chain.minimal(chain.home)
-        unfit, small = [] if slips else problems(chain, z), list[Unfit]()
+        unfit, small, strained, far = [] if slips else problems(chain, z), list[Unfit](), list[str](), ""
         if not unfit:
-            small = list(unfit_pumps(chain, tool_task(chain)))
+            small = list(unfit_pumps(chain, task := tool_task(chain)))
+            strained, far = list(strained_actuators(chain, z)), far_fixture(chain, task)
     except SkillframeError as error:
         text, fix = (error.problem, error.fix) if isinstance(error, InputError) else (str(error), "correct robot.toml")
         yield cannot_run(f"{text}: it can be checked and shown, not run", fix)
@@ -70,6 +75,10 @@ def machine_warnings(robot: RobotModel) -> Iterator[Problem]:
             yield warning("undamped_swing", text, "write damping in its [[passive]] table")
     for text in short_struts(chain):
         yield warning("short_reach", text, "correct its pins, closed or stroke, or the joint's limits")
+    for text in strained:
+        yield warning("little_force_left", text, "a larger bore, more supply_pressure, less load, or another [home]")
+    if far:
+        yield warning("far_fixture", far, "write another fixture under [workspace], within the working range")
     for text in unfit:
         yield warning("impossible_home", f"at home {text}", "choose another [home]")
     given, default = spec.limits, Limits()
@@ -79,3 +88,6 @@ def machine_warnings(robot: RobotModel) -> Iterator[Problem]:
     if given.torque_rate_nm_s == default.torque_rate_nm_s:
         text = f"[limits] torque_rate_nm_s is {default.torque_rate_nm_s:g} N m/s, the default for arms"
         yield warning("arm_limits", text, "write torque_rate_nm_s = 1e7, or what the machine may do, under [limits]")
+    if not unfit and not slips:
+        for code, text, fix, figures in working_figures(chain):
+            yield Problem(code=code, severity="info", where="robot.toml", message=text, fix=fix, figures=figures)
