@@ -20,7 +20,7 @@ MACHINES = Path(__file__).parent / "machines"
 
 
 class Published(NamedTuple):
-    """A figure of the data sheet that robot.toml names [m], which of ours it is, and the frame if not the tool."""
+    """A published figure, whose source robot.toml names [m], which of ours it is, and the frame if not the tool."""
 
     metres: float
     figure: str = "reach"
