@@ -152,8 +152,20 @@ def quantities(params: type | None = None) -> Mapping[str, Quantity]:
 
 @lru_cache(maxsize=1)
 def _found(known: Registry) -> Mapping[str, Quantity]:
-    drives = (record for record in known.records("drive") if record.quantities is not None)
-    return {each.name: each for each in (*QUANTITIES, *(one for record in drives for one in record.quantities()))}
+    return {each.name: each for each in (*QUANTITIES, *(one for own in _declared(known).values() for one in own))}
+
+
+@lru_cache(maxsize=1)
+def _declared(known: Registry) -> Mapping[str, Sequence[Quantity]]:
+    """Quantities by drive. One that fails has none, and the error is its plug-in's."""
+    found = {}
+    for record in known.records("drive"):
+        try:
+            found[record.name] = () if record.quantities is None else tuple(record.quantities())
+        except Exception as error:
+            found[record.name] = ()
+            known.provider("drive", record.name).fail(error)
+    return found
 
 
 @lru_cache(maxsize=256)
@@ -172,7 +184,7 @@ def unknown(name: str, known: Iterable[str], where: str = "") -> UnknownName:
     """The error for an unknown quantity, with the names of its group."""
     names = list(known)
     group = [each for each in names if each.startswith(f"{name.partition('.')[0]}.")]
-    return UnknownName("quantity", name, group or names, where=where)
+    return UnknownName("quantity", name, group or names, registry().failures(), where=where)
 
 
 def typed_value(quantity: Quantity, value: Any, where: str) -> Any:
@@ -215,5 +227,5 @@ def lacks(key: str, spec: RobotSpec) -> str:
         return why
     if key == "robot.payload" and spec.payload is None:
         return "declares no payload"
-    declared = () if own is None or own.quantities is None else own.quantities()
+    declared = () if own is None else _declared(registry())[own.name]
     return "" if key in _COMMON or key in (each.name for each in declared) else "has no drive with such a quantity"

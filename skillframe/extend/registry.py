@@ -155,11 +155,15 @@ class Registry:
                 return failed if plugin.error else ""
         return f"skillframe-{home} does, and is not installed; type: {install_line(home)}" if home else ""
 
+    def failures(self) -> str:
+        """Plug-ins with an error, and their errors, or ""."""
+        failed = [f"{p.distribution} {p.version} ({p.error})" for p in self.plugins if p.error]
+        return f"these plug-ins failed to load: {', '.join(failed)}" if failed else ""
+
     def _absences(self, kind: str, name: str) -> str:
         """Why the plug-in of a missing name may be absent."""
         here = [*(plugin.name for plugin in self.plugins), *self.unselected]
-        failed = [f"{p.distribution} {p.version} ({p.error})" for p in self.plugins if p.error]
-        notes = [f"these plug-ins failed to load: {', '.join(failed)}"] if failed else []
+        notes = list(filter(None, [self.failures()]))
         if self.unselected:
             notes.append(f"SKILLFRAME_PLUGINS leaves out {', '.join(self.unselected)}")
         if self.not_installed:

@@ -273,3 +273,25 @@ def test_what_an_audit_says_is_a_warning_of_what_learns(install, fresh_registry)
     install("one", AUDIT)
     demonstration = make()
     assert suspicions([demonstration, demonstration]) == [": odd", ": odd"]
+
+
+def test_a_drive_whose_quantities_fail_stops_no_other_robot_and_is_named(install, monkeypatch):
+    from skillframe.extend import drives
+
+    install(
+        "lagging",
+        """
+        from skillframe import hookimpl
+        from skillframe.extend import DriveType, Lazy
+
+        @hookimpl
+        def skillframe_drives():
+            yield DriveType(name="lag", summary="late", make=print, quantities=Lazy("no_such_module:quantities"))
+        """,
+    )
+    known = load_registry()
+    monkeypatch.setattr(drives, "registry", lambda: known)
+    assert "world.friction" in drives.quantities()
+    assert "No module named 'no_such_module'" in plugin(known, "lagging").error
+    with pytest.raises(UnknownName, match="dist-lagging 1.0 .*no_such_module"):
+        raise drives.unknown("motor.lag", drives.quantities())
