@@ -102,8 +102,13 @@ class FakeArm:
 
     def _by_hand(self) -> Float:
         """Wrench (6,) of the operator at the tool frame's origin, base axes."""
-        lever = self.pose.rotation[0] @ self.tip
-        return np.concatenate([self.pressed, np.cross(lever, self.pressed)])
+        return self.at_origin(self.pressed)
+
+    def at_origin(self, force: Float) -> Float:
+        """Wrench (6,) at the tool frame's origin of a force (3,) on the tip, base axes."""
+        if not force.any():  # in nearly every millisecond, and numpy's cross takes longer than the simulator's step
+            return np.zeros(6)
+        return np.concatenate([force, np.cross(self.pose.rotation[0] @ self.tip, force)])
 
     @property
     def position(self) -> Float:
@@ -217,8 +222,7 @@ class FakeController(ABC):
     def loaded(self) -> Float:
         """The wrench (6,) at the sensor, with the weight of a payload that the robot does not know."""
         weight = np.array([0.0, 0.0, -9.81 * self.faults.get("payload", 0.0)])
-        lever = self.arm.pose.rotation[0] @ self.arm.tip
-        loaded: Float = self.arm.wrench + np.concatenate([weight, np.cross(lever, weight)])
+        loaded: Float = self.arm.wrench + self.arm.at_origin(weight)
         return loaded
 
     def felt(self, zero: Float) -> Float:

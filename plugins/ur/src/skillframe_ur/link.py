@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from ctypes import py_object, pythonapi
 
 import numpy as np
 from skillframe_drive.link import SILENT_S, RobotState
@@ -95,3 +96,5 @@ class UrLink:
             self._control.stopScript()
             self._control.disconnect()
             self._state.disconnect()
+        for client in (self._control, self._state):  # never destroyed: that waits a second more, or to connect again
+            pythonapi.Py_IncRef(py_object(client))
