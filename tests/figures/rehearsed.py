@@ -51,7 +51,7 @@ RUN_S = {"ur": 8.0, "franka": 4.0, "ros2": 4.0}
 WITHIN_S, GONE_S = 0.06, 1.0
 """What is asked: times within which the motion has ended and the runner gone."""
 STOPS = {
-    "protective_stop": r"protective or emergency stop|aborted by reflex|program has stopped|no state",
+    "protective_stop": r"protective or emergency stop|in the mode|aborted by reflex|program has stopped|no state",
     "cut": r"no state|[Tt]imeout|connection|program has stopped|no (Universal|Franka) [Rr]obot|does not|publishe",
     "stall": r"no state|[Tt]imeout|program has stopped|states? of the robot were lost|reflex|publishe",
     "hung": r"no state|states of the robot were lost|program has stopped|reflex|[Tt]imeout|no target",
@@ -152,7 +152,7 @@ def in_simulation(
                      duration_s=LONGEST_S[world])  # fmt: skip
     columns = {"success": found.success, "duration_s": found.duration_s, "peak_n": found.peak_force_n,
                "failure": found.failure, "reason": found.reason, "filtered_n": found.peak_force_filtered_n}  # fmt: skip
-    return [{name: np.asarray(each)[i].item() for name, each in columns.items()} for i in range(len(seeds))]
+    return [{name: np.asarray(each).tolist()[i] for name, each in columns.items()} for i in range(len(seeds))]
 
 
 def drawn(number: int, link: str) -> tuple[Plan, dict[str, float], list[str]]:

@@ -98,6 +98,7 @@ class FakeFranka(FakeController):
         """End the motion by a reflex."""
         if self._move is not None:
             self._end(REFLEX, REFLEX_MODE, f"reflex: {why}")
+        self._mode = REFLEX_MODE
 
     def serve(self) -> None:
         """Answer requests, and take a command while torque control runs."""

@@ -53,6 +53,10 @@ class FrankaLink:
         if self._motion is not None and time.perf_counter() - asked > SILENT_S:
             self.fault = f"no state from the robot for {1e3 * SILENT_S:.0f} ms"
             return self._seen
+        modes = self._library.RobotMode
+        if self._motion is None and state.robot_mode in (modes.Reflex, modes.UserStopped):  # else readOnce fails
+            self.fault = f"the robot is in the mode {state.robot_mode.name}: release its stops and errors in Desk"
+            return self._seen
         now = state.time.to_sec()
         if self._last is not None:
             self.missed += max(0, round((now - self._last) / self.period) - 1)
