@@ -293,5 +293,5 @@ def test_a_drive_whose_quantities_fail_stops_no_other_robot_and_is_named(install
     monkeypatch.setattr(drives, "registry", lambda: known)
     assert "world.friction" in drives.quantities()
     assert "No module named 'no_such_module'" in plugin(known, "lagging").error
-    with pytest.raises(UnknownName, match="dist-lagging 1.0 .*no_such_module"):
+    with pytest.raises(UnknownName, match=r"dist-lagging 1\.0 .*no_such_module"):
         raise drives.unknown("motor.lag", drives.quantities())
