@@ -93,17 +93,18 @@ def run_set(
     return {"family": family, "seed": seed, "failed": failed, "results": results}
 
 
-def directions(seed: int, family: str, kinds: Sequence[str]) -> list[str]:
+def directions(seed: int, family: str, kinds: Sequence[str], ablations: bool = False) -> list[str]:
     """How far below a hump's floor each learned push points, beside the pushes that pass (no execution)."""
     scene, turn, rng = drawn(family, seed)
     low = np.degrees(np.arctan(scene.friction))
     high, lines = 90.0 - low - np.degrees(scene.params["slope"]), []
     for kind, shown in demonstrations(scene, turn, rng, kinds, EACH, FLOORS.get(family, SHORT))[0].items():
-        push = lmc_row(shown).push
-        x, _, z = turn.T @ push
-        below = np.degrees(np.arctan2(-z, x)) if push.any() else np.nan
-        said = "passes" if low < below < high else "does not"
-        lines.append(f"{seed} {kind:12} {below:5.1f} in {low:.1f} to {high:.1f}: {said}")
+        whole = lmc_row(shown)
+        for name, row in {"": whole, **(ablated(shown, whole) if ablations else {})}.items():
+            x, _, z = turn.T @ row.push
+            below = np.degrees(np.arctan2(-z, x)) if row.push.any() else np.nan
+            said = "passes" if low < below < high else "does not"
+            lines.append(f"{family} {seed} {kind:12} {name:32} {below:5.1f} in {low:.1f} to {high:.1f}: {said}")
     return lines
 
 
@@ -152,7 +153,10 @@ def main(given: Sequence[str]) -> None:
     families = list(FAMILIES) if "all" in args.families else args.families
     if args.directions:
         for seed in range(args.first, args.first + args.sets):
-            print("\n".join(line for family in families for line in directions(seed, family, args.kinds)), flush=True)
+            print(
+                "\n".join(line for family in families for line in directions(seed, family, args.kinds, args.ablations)),
+                flush=True,
+            )
         return
     runs = sets_of(families, args)
     whole = [kind for kind in args.kinds if kind != SHAKY]

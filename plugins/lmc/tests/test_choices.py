@@ -12,7 +12,7 @@ from skillframe_lmc.learner import learn
 from skillframe_lmc.sectors import Sectors, sectors
 
 from skillframe.extend import LearnOptions
-from skillframe.frames import Float
+from skillframe.frames import Float, unit
 
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -90,3 +90,20 @@ def test_of_a_part_that_is_known_to_go_straight_the_turn_is_given_way_to_and_not
     assert told["translation"]["desired_direction"] == alone["translation"]["desired_direction"]
     both = syn.pair_of_alignments(syn.Recipe(noise_m=5e-5, noise_n=0.3))  # from both sides there is none to drop
     assert learn(both, LearnOptions(straight=True)) == learn(both, LearnOptions())
+
+
+def slid(towards: list[float], normal: list[float], friction: float = 0.2) -> Sectors:
+    """A demonstration of three intervals, slid along a direction on a face."""
+    motion = unit(np.array(towards, dtype=float))
+    push = unit(friction * motion - unit(np.array(normal, dtype=float)))
+    return Sectors(np.tile(motion, (3, 1)), np.tile(push, (3, 1)), np.ones(3, dtype=bool))
+
+
+def test_pyramids_of_both_sides_of_a_valley_share_the_middle_most_deeply() -> None:
+    found = choose([slid([1, 0, -1], [1, 0, 1]), slid([-1, 0, -1], [-1, 0, 1])])
+    assert found.direction is not None and found.direction @ DOWN > np.cos(np.radians(2.0))
+
+
+def test_pyramids_of_opposite_pushes_share_no_direction() -> None:
+    found = choose([slid([1, 0, 0], [0, 0, 1]), slid([-1, 0, 0], [0, 0, -1])])
+    assert found.direction is None and found.pyramid_angle is not None and found.pyramid_angle > np.radians(25.0)
