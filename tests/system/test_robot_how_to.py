@@ -49,7 +49,7 @@ def crane(tmp_path):
 
 def test_the_blocks_of_the_crane_page_make_a_crane_with_nothing_to_warn_of(crane):
     spec = crane('fmu = "hydraulic_cylinder"', "[payload]", "[limits]")
-    assert audit(spec).problems == ()
+    assert [p for p in audit(spec).problems if p.severity != "info"] == []
     mine, shipped = (cylinders(robot.actuation) for robot in (spec, load_robot("hiab_xs031")))
     for field in fields(mine):  # the page rounds the flow to 1.67e-3 m3/s, by 0.2 %
         np.testing.assert_allclose(getattr(mine, field.name), getattr(shipped, field.name), rtol=3e-3)
