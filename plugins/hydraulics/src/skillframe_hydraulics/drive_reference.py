@@ -24,12 +24,14 @@ IMPEDANCE_RATE, LEAST_DAMPING = 2.0, 5e4  # 1/s and N s/m; damping for skills th
 
 
 class _Told(NamedTuple):
-    """Inputs of `aim_function` copied from commands: (N, 3), (N, 6), (N, 6) and (1,)."""
+    """Inputs of `aim_function` copied from commands: (N, 3), (N, 6), (N, 6), (1,) and twice (N, 6, 6)."""
 
     position: Float
     twist: Float
     push: Float
     ramp: Float
+    stiffness: Float
+    damping: Float
 
 
 class ToolReference:
@@ -54,19 +56,19 @@ class ToolReference:
             see_function(axes, gauges.lag), [law.at.tip, law.at.tip_rate, force.feedback, tool],
             [self.position, self.twist, self.wrench],
         )  # fmt: skip
-        self._told = _Told(np.zeros((count, 3)), np.zeros((count, 6)), np.zeros((count, 6)), np.zeros(1))
+        still, gains = np.zeros((2, count, 6)), np.zeros((2, count, 6, 6))
+        self._told = _Told(np.zeros((count, 3)), *still, np.zeros(1), *gains)
         measured, reference = law.given
         self._fine: Float = np.zeros(count)
         self._aim = Batch(
             aim_function(axes, gauges.lag, n, k, guard.glance, dt),
             [
                 gauges.z, gauges.rate, gauges.pressure_a, gauges.pressure_b, force.answered, force.sigma,
-                *self._told, reference.stiffness, reference.damping, self.position, self.twist, self.wrench,
-                guard.energy,
+                *self._told, self.position, self.twist, self.wrench, guard.energy,
             ],
             [
                 *measured, reference.position, reference.velocity, reference.push, self.law_wrench,
-                np.zeros(count), self._fine,
+                np.zeros(count), self._fine, reference.stiffness, reference.damping,
             ],
             (9,), carried={10: 15},
         )  # fmt: skip
@@ -94,18 +96,15 @@ class ToolReference:
 
     def aim(self, command: Command, ramp: float) -> None:
         """Write reference and measurements into the controller's arrays. `ramp`, 0 to 1, fades a command in."""
-        told, reference = self._told, self._law.given[1]
+        told = self._told
         told.position[...], told.twist[...], told.push[...] = command.pose.position, command.twist, command.feedforward
         told.ramp[0] = ramp
-        stiffness, damping = command.impedance
-        reference.stiffness[...] = self._axes @ stiffness[..., :3, :3] @ self._axes.T
+        told.stiffness[...], damping = command.impedance
         if damping is None:
-            largest = np.linalg.eigvalsh(reference.stiffness)[..., -1]
-            reference.damping[...] = np.maximum(largest / IMPEDANCE_RATE, LEAST_DAMPING)[..., None, None] * np.eye(
-                len(self._axes)
-            )
+            largest = np.linalg.eigvalsh(self._axes @ told.stiffness[:, :3, :3] @ self._axes.T)[:, -1]
+            told.damping[:, :3, :3] = np.maximum(largest / IMPEDANCE_RATE, LEAST_DAMPING)[:, None, None] * np.eye(3)
         else:
-            reference.damping[...] = self._axes @ damping[..., :3, :3] @ self._axes.T
+            told.damping[...] = damping
         self._aim.run(self._everyone)
 
 
@@ -123,18 +122,18 @@ def aim_function(axes: Float, lag: float, n: int, k: int, limits: Glance, dt: fl
     """The controller's measurements and reference, and whether all is well inside the limits.
 
     Inputs: z, rate, pressure_a, pressure_b, force, sigma; a command's position (3,), twist (6,), feed-forward (6,);
-    ramp; stiffness and damping along the axes (m m,); observed position (3,), twist (6,) and wrench (6,); energy.
+    ramp; stiffness and damping (6 6,); observed position (3,), twist (6,) and wrench (6,); energy.
     Outputs: z + lag z', rate, pressures, force, sigma; position, velocity, push along the axes; F (6,) of equation (1);
-    energy after the tick [J]; 1 if well inside the limits, else 0.
+    energy after the tick [J]; 1 if well inside the limits, else 0; stiffness and damping along the axes (m m,).
     """
     m = len(axes)
-    sizes = (n, n, k, k, m, m, 3, 6, 6, 1, m * m, m * m, 3, 6, 6, 1)
+    sizes = (n, n, k, k, m, m, 3, 6, 6, 1, 36, 36, 3, 6, 6, 1)
     given = [ca.SX.sym(f"given{i}", size) for i, size in enumerate(sizes)]
     z, rate, p_a, p_b, force, sigma, position, twist, push, ramp, stiffness, damping, at, moving, felt, energy = given
     along = constant(axes)
     velocity, push = ramp * (along @ twist[:3]), ramp * (along @ push[:3])
     error, lead = along @ (position - at), velocity - along @ moving[:3]
-    k, d = (ca.reshape(rows, m, m).T for rows in (stiffness, damping))
+    k, d = (along @ ca.reshape(rows, 6, 6).T[:3, :3] @ along.T for rows in (stiffness, damping))
     pull = push + k @ error + d @ lead
     wrench = ca.densify(ca.vertcat(along.T @ pull, ca.SX.zeros(3)))
     measured = [z + lag * rate, rate, p_a, p_b, force, sigma]
@@ -143,4 +142,5 @@ def aim_function(axes: Float, lag: float, n: int, k: int, limits: Glance, dt: fl
     sums = ca.DM(limits.squares).T @ (from_centre * from_centre)
     within = [sums <= limits.bounds, energy <= limits.energy]
     fine = ca.if_else(ca.sum1(ca.vertcat(*within)) >= len(limits.bounds) + 1, 1.0, 0.0)
-    return ca.Function("aim", given, [*measured, along @ position, velocity, push, wrench, energy, fine])
+    gains = [ca.densify(rows.T) for rows in (k, d)]  # row by row, as in numpy
+    return ca.Function("aim", given, [*measured, along @ position, velocity, push, wrench, energy, fine, *gains])
