@@ -56,8 +56,10 @@ class ToolReference:
             see_function(axes, gauges.lag), [law.at.tip, law.at.tip_rate, force.feedback, tool],
             [self.position, self.twist, self.wrench],
         )  # fmt: skip
-        still, gains = np.zeros((2, count, 6)), np.zeros((2, count, 6, 6))
-        self._told = _Told(np.zeros((count, 3)), *still, np.zeros(1), *gains)
+        self._told = _Told(
+            np.zeros((count, 3)), np.zeros((count, 6)), np.zeros((count, 6)), np.zeros(1), np.zeros((count, 6, 6)),
+            np.zeros((count, 6, 6)),
+        )  # fmt: skip
         measured, reference = law.given
         self._fine: Float = np.zeros(count)
         self._aim = Batch(
@@ -133,8 +135,8 @@ def aim_function(axes: Float, lag: float, n: int, k: int, limits: Glance, dt: fl
     along = constant(axes)
     velocity, push = ramp * (along @ twist[:3]), ramp * (along @ push[:3])
     error, lead = along @ (position - at), velocity - along @ moving[:3]
-    k, d = (along @ ca.reshape(rows, 6, 6).T[:3, :3] @ along.T for rows in (stiffness, damping))
-    pull = push + k @ error + d @ lead
+    gains = [along @ ca.reshape(rows, 6, 6).T[:3, :3] @ along.T for rows in (stiffness, damping)]
+    pull = push + gains[0] @ error + gains[1] @ lead
     wrench = ca.densify(ca.vertcat(along.T @ pull, ca.SX.zeros(3)))
     measured = [z + lag * rate, rate, p_a, p_b, force, sigma]
     energy = energy + ca.dot(wrench, moving) * dt
@@ -142,5 +144,5 @@ def aim_function(axes: Float, lag: float, n: int, k: int, limits: Glance, dt: fl
     sums = ca.DM(limits.squares).T @ (from_centre * from_centre)
     within = [sums <= limits.bounds, energy <= limits.energy]
     fine = ca.if_else(ca.sum1(ca.vertcat(*within)) >= len(limits.bounds) + 1, 1.0, 0.0)
-    gains = [ca.densify(rows.T) for rows in (k, d)]  # row by row, as in numpy
-    return ca.Function("aim", given, [*measured, along @ position, velocity, push, wrench, energy, fine, *gains])
+    rows = [ca.densify(gain.T) for gain in gains]  # in numpy's order
+    return ca.Function("aim", given, [*measured, along @ position, velocity, push, wrench, energy, fine, *rows])
