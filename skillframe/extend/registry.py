@@ -163,7 +163,7 @@ class Registry:
     def _absences(self, kind: str, name: str) -> str:
         """Why the plug-in of a missing name may be absent."""
         here = [*(plugin.name for plugin in self.plugins), *self.unselected]
-        notes = list(filter(None, [self.failures()]))
+        notes = [failed] if (failed := self.failures()) else []
         if self.unselected:
             notes.append(f"SKILLFRAME_PLUGINS leaves out {', '.join(self.unselected)}")
         if self.not_installed:

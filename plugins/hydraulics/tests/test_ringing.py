@@ -19,10 +19,10 @@ DT, END = 1e-3, SWING_S
 HARD = dict.fromkeys(("boom", "stick", "bucket"), "velocity_gain = 5e-3\nforce_gain = 4e-9")
 
 
-def swung(*tools):
+def swung(*tools, until=END):
     """After a swing of tools whose velocities are told by time and path."""
     seen = Ringing(len(tools), DT, END)
-    for tick in range(round(END / DT)):
+    for tick in range(round(until / DT)):
         _, velocity, _, _ = swing(tick * DT)
         seen.step(np.array([tool(tick * DT, velocity) for tool in tools]), velocity)
     return seen
@@ -44,6 +44,11 @@ def test_speeds_are_those_of_what_was_shown():
     assert seen.beside[0] == pytest.approx(0.3 / np.sqrt(2.0), rel=1e-3)  # whole periods, 49
     assert seen.after[0] == pytest.approx(0.3 / np.sqrt(2.0), rel=0.02)  # three and a half
     assert "7.0 times a second" in seen.sentences(law("hiab_xs031"))[0]
+
+
+def test_a_machine_that_fails_before_it_was_commanded_to_rest_is_not_said_to_move_at_rest():
+    (text,) = swung(lambda t, v: v + 1.0, until=1.0).sentences(law("hiab_xs031"))
+    assert "beside a path of" in text and "lacks the pressure to carry its load" in text and "at rest" not in text
 
 
 def test_a_machine_that_follows_late_or_badly_or_not_at_all_does_not_ring():

@@ -76,6 +76,20 @@ def test_a_machine_of_fewer_than_eighty_lines_reaches_as_far_as_its_data_sheet_s
     assert ours == pytest.approx(metres, rel=0.05)
 
 
+def test_a_dead_centre_is_a_moment_arm_below_a_sixth_of_a_short_stroke():
+    chain, arms = chain_of("kubota_u17"), []
+    home, bucket = chain.minimal(chain.home), chain.actuated.index("bucket_rod")
+    for turn in np.linspace(-0.9, 1.2, 43):
+        try:
+            z = chain.settled(home + np.array([0.0, 0.0, 0.0, turn]))
+        except InputError:
+            continue
+        arms.append(float(np.abs(chain.at(z, 0.0 * z).arms[bucket]).max()))
+        said = any("bucket_rod is near its dead centre" in text for text in problems(chain, z))
+        assert said == (arms[-1] < 0.4 / 6.0), arms[-1]
+    assert any(arm < 0.06 for arm in arms) and any(0.07 < arm < 0.1 for arm in arms)
+
+
 def test_no_sampled_configuration_lies_outside_the_working_range():
     chain = chain_of("kubota_u17")
     found, rng, places = working_range(chain), np.random.default_rng(0), []

@@ -85,9 +85,9 @@ def problems(chain: ClosedChain, z: Float) -> list[str]:
             far = f"it moves {turn:.3g} times as far as what moves it"
             found.append(f"the linkage of {name} is near its dead centre: {far}")
     found += _outside(chain, state.q)
-    strokes = [float(a.known.get("stroke", math.inf)) for a in chain.robot.spec.actuation]
-    for name, arm, stroke in zip(chain.actuated, np.abs(state.arms).max(axis=1), strokes, strict=False):
-        least = min(LEAST_ARM, stroke / 6.0)
+    strokes = {a.joint: float(a.known.get("stroke", math.inf)) for a in chain.robot.spec.actuation}
+    for name, arm in zip(chain.actuated, np.abs(state.arms).max(axis=1), strict=True):
+        least = min(LEAST_ARM, strokes.get(name, math.inf) / 6.0)
         if name not in chain.independent and arm < least:
             found.append(f"{name} is near its dead centre: its moment arm is {arm:.3f} m, below {least:.3g} m")
     if not found:

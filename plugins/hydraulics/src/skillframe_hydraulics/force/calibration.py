@@ -199,11 +199,11 @@ class Ringing:
     def _text(self, i: int) -> str:
         beside, told, after = (1e3 * x for x in (self.beside[i], self.told, self.after[i]))
         often = float(self._turns[i].max()) / (2.0 * LOOK_S)
-        text = f"the machine rings: its tool swings {beside:.0f} mm/s (rms) beside a path of {told:.0f} mm/s"
+        swings = f"its tool swings {beside:.0f} mm/s (rms) beside a path of {told:.0f} mm/s"
         if self._ticks <= self._from:  # ended before it was commanded to rest
-            return f"{text}, or has too little pressure for its load"
+            return f"the machine rings: {swings}; or it lacks the pressure to carry its load"
         at_rest = f"still moves at {after:.0f} mm/s when commanded to rest, to and fro {often:.1f} times a second"
-        return f"{text}, and {at_rest}"
+        return f"the machine rings: {swings}, and {at_rest}"
 
 
 def what_to_set(law: CompiledLaw) -> str:
