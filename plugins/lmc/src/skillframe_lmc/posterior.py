@@ -13,7 +13,7 @@ where a short one bounds the set.
 
 The weights of a contact of length L add up to 1 - exp(-L / l_0): a long floor is one witness, a spike a fraction of
 one. Demonstrations are scaled to the same sum, in which those that show the same share theirs: a recording played twice
-counts once. v, m and edge of a piece are replaced by their kappa-means.
+counts once.
 
 **Explanation.** Let a be the angle of a push D from v in the plane of v and the edge, w the angle of the edge, and out
 the angle of D out of that plane. A piece in contact, or free, explains D with
@@ -81,7 +81,7 @@ class Choice(NamedTuple):
 
 
 class Witnesses(NamedTuple):
-    """K pieces with their kappa-means, and the weight (K,) of each."""
+    """K pieces, and the weight (K,) of each."""
 
     pieces: Pieces
     weight: Float
@@ -99,11 +99,7 @@ def witnesses(pieces: Pieces, whole: float) -> Witnesses:
     alike = np.where(free[:, None] == free, np.exp(-0.5 * apart), 0.0) * pieces.length
     same = alike.sum(axis=1)
     weight = pieces.length * (1.0 - np.exp(-same / whole)) / same
-    weight = weight * _balance(alike, pieces, weight)
-    mean = pieces._replace(
-        motion=unit(alike @ pieces.motion), push=unit(alike @ pieces.push), edge=unit(alike @ pieces.edge)
-    )
-    return _merged(mean, weight)
+    return _merged(pieces, weight * _balance(alike, pieces, weight))
 
 
 def _balance(alike: Float, pieces: Pieces, weight: Float) -> Float:
@@ -118,11 +114,11 @@ def _balance(alike: Float, pieces: Pieces, weight: Float) -> Float:
     return result
 
 
-def _merged(mean: Pieces, weight: Float) -> Witnesses:
+def _merged(pieces: Pieces, weight: Float) -> Witnesses:
     """Witnesses of the same face as one each, for speed: within 3 degrees, where an edge is soft by 5."""
     near = (
-        (mean.motion @ mean.motion.T >= MERGED) & (mean.edge @ mean.edge.T >= MERGED)
-        & (mean.contact[:, None] == mean.contact) & (np.abs(mean.turning[:, None] - mean.turning) < 0.1)
+        (pieces.motion @ pieces.motion.T >= MERGED) & (pieces.edge @ pieces.edge.T >= MERGED)
+        & (pieces.contact[:, None] == pieces.contact) & (np.abs(pieces.turning[:, None] - pieces.turning) < 0.1)
     )  # fmt: skip
     left, groups = np.ones(len(weight), dtype=bool), list[NDArray[np.float64]]()
     while left.any():
@@ -134,8 +130,8 @@ def _merged(mean: Pieces, weight: Float) -> Witnesses:
     share = by / total[:, None]
     first = by.argmax(axis=1)
     merged = Pieces(
-        unit(share @ mean.motion), unit(share @ mean.push), unit(share @ mean.edge), mean.contact[first],
-        (by > 0.0) @ mean.length, share @ mean.turning, mean.demonstration[first],
+        unit(share @ pieces.motion), unit(share @ pieces.push), unit(share @ pieces.edge), pieces.contact[first],
+        (by > 0.0) @ pieces.length, share @ pieces.turning, pieces.demonstration[first],
     )  # fmt: skip
     return Witnesses(merged, total)
 
