@@ -12,6 +12,7 @@ smaller for motions shorter than five of them, and larger for position noise or 
 
 from __future__ import annotations
 
+from math import dist
 from typing import NamedTuple
 
 import numpy as np
@@ -195,13 +196,10 @@ def _length(points: Float) -> float:
 
 def _knots(points: Float, step: float) -> NDArray[np.intp]:
     """Indices where the distance from the last knot reaches the step, in plain floats for speed."""
-    rows, limit = points.tolist(), step * step
+    rows = points.tolist()
     knots, last = [0], rows[0]
     for i, row in enumerate(rows[1:], start=1):
-        square = 0.0
-        for a, b in zip(row, last, strict=True):
-            square += (a - b) * (a - b)
-        if square >= limit:
+        if dist(row, last) >= step:
             knots.append(i)
             last = row
     return np.array(knots)
