@@ -56,7 +56,8 @@ def machine_warnings(robot: RobotModel) -> Iterator[Problem]:
             yield warning("relief_pressure", text, fix)
     if tied := [a.joint for a in spec.actuation if lacks_static_friction(a)]:
         text = f"no static_friction is given for {', '.join(tied)}: taken as equal to coulomb_friction"
-        yield warning("static_friction", text, "add it to parameters if the pistons stick harder than they slide")
+        fix = "add it to parameters if the pistons stick harder than they slide"
+        yield Problem(code="static_friction", severity="info", where="robot.toml", message=text, fix=fix)
     try:
         chain = ClosedChain(robot)
         z = chain.minimal(chain.home)
