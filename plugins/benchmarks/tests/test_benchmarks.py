@@ -310,6 +310,29 @@ def test_a_method_that_learns_nothing_leaves_the_others_their_skills_and_says_wh
     assert not (tmp_path / "00007/refused.json").exists()
 
 
+def test_an_assembly_that_nobody_demonstrates_is_learned_from_its_removal(tmp_path, monkeypatch):
+    from skillframe_benchmarks import assembly
+    from skillframe_benchmarks.assets import Pair
+
+    def fails(fixture, folder, plan):
+        raise SkillframeError("0 of 20 attempts succeeded")
+
+    made = SimpleNamespace(save=lambda path: path.write_text("{}"))
+    monkeypatch.setattr(assembly, "METHODS", {"lmc": lambda shown: made})
+    monkeypatch.setattr(assembly, "WITHOUT_DEMONSTRATION", {"removal": lambda shown: made})
+    monkeypatch.setattr(assembly, "_world", lambda pair, folder: folder / "fixture.toml")
+    monkeypatch.setattr(assembly, "_shown", fails)
+    monkeypatch.setattr(assembly, "_removed", lambda fixture, folder, plan: [])
+    ran = []
+    monkeypatch.setattr(assembly, "_campaign", lambda fixture, skills, out, plan: ran.append([*skills]) or {})
+    pair = Pair(name="00308", plug=tmp_path / "p.obj", socket=tmp_path / "s.obj", way_out=None)
+    plan = assembly.Plan(methods=("lmc", "removal"), levels=("1mm-2deg-0.2",))
+    assembly.run(assembly.AssemblyJob(pair=pair, folder=tmp_path / "00308", plan=plan), lambda line: None)
+    assert ran == [["removal"]]
+    assert json.loads((tmp_path / "00308/unlearned.json").read_text()) == {"lmc": "0 of 20 attempts succeeded"}
+    assert not (tmp_path / "00308/refused.json").exists()
+
+
 def test_all_trials_of_a_method_that_learned_nothing_count_as_failed_at_every_level(tmp_path):
     from skillframe_benchmarks import page
     from skillframe_benchmarks.assembly import LEVELS, Plan

@@ -22,7 +22,7 @@ from skillframe_parts.load import load
 from skillframe_teaching import sessions
 from skillframe_teaching.teacher import TeacherSettings
 
-from skillframe import Campaign, CampaignResults, LearnedSkill, Recording, record
+from skillframe import Campaign, CampaignResults, Recording, record
 from skillframe.api import demonstrations_of, robot_of, scene_of
 from skillframe.campaign import Options, evaluate, run_campaign
 from skillframe.campaign import load as load_campaign
@@ -31,7 +31,7 @@ from skillframe.errors import SkillframeError, SkillframeWarning
 from skillframe.extend import make_scene, no_progress, registry
 from skillframe.files import write_whole
 from skillframe_benchmarks.assets import Pair
-from skillframe_benchmarks.methods import METHODS
+from skillframe_benchmarks.methods import METHODS, WITHOUT_DEMONSTRATION, Method
 from skillframe_benchmarks.places import fitting
 
 SCORES = ("automate_height", "automate_distance")
@@ -80,7 +80,7 @@ class Plan:
         robot: name of a shipped robot, or a robot.toml.
         trials: per level, the same samples for every method.
         seed: of demonstrations; draws: of the samples, None: the same.
-        methods: names of `METHODS`.
+        methods: names of `METHODS` and `WITHOUT_DEMONSTRATION`.
         levels: names of `LEVELS`.
         duration_s: longest duration of a trial.
     """
@@ -89,7 +89,7 @@ class Plan:
     trials: int = 20
     seed: int = 1
     draws: int | None = None
-    methods: tuple[str, ...] = tuple(METHODS)
+    methods: tuple[str, ...] = (*METHODS, *WITHOUT_DEMONSTRATION)
     levels: tuple[str, ...] = tuple(level.name for level in LEVELS)
     duration_s: float = 15.0
 
@@ -135,10 +135,7 @@ def _run(job: AssemblyJob, cost: _Cost, tell: Callable[[str], None]) -> None:
     folder, plan = job.folder, job.plan
     with cost.of("parts"), _refusing(job, "parts"):
         fixture = _world(job.pair, folder)
-    with cost.of("demonstrations"), _refusing(job, "demonstrations"):
-        shown = _shown(fixture, folder, plan)
-    with cost.of("learning"):
-        skills, unlearned = _taught(job, shown)
+    skills, unlearned = _taught(job, fixture, cost)
     _keep(folder / UNLEARNED, unlearned)
     for name, why in unlearned.items():
         tell(f"{job.pair.name}: {name} learned nothing and counts as failed: {why}")
@@ -150,14 +147,25 @@ def _run(job: AssemblyJob, cost: _Cost, tell: Callable[[str], None]) -> None:
         tell(f"{job.pair.name}, {name}: " + ", ".join(f"{k} {v} of {plan.trials}" for k, v in each.items()))
 
 
-def _taught(job: AssemblyJob, shown: list[Demonstration]) -> tuple[dict[str, Path], dict[str, str]]:
+def _taught(job: AssemblyJob, fixture: Path, cost: _Cost) -> tuple[dict[str, Path], dict[str, str]]:
+    """Skills by method, and why others were not learned."""
     skills, unlearned = {}, {}
-    for name in job.plan.methods:
+    for source, given in ((_shown, METHODS), (_removed, WITHOUT_DEMONSTRATION)):
+        methods = [name for name in job.plan.methods if name in given]
+        if not methods:
+            continue
         try:
-            with _refusing(job, name):
-                skills[name] = _learned(name, shown, job.folder)
+            with cost.of("demonstrations"), _refusing(job, "demonstrations"):
+                shown = source(fixture, job.folder, job.plan)
         except Refused as error:
-            unlearned[error.step] = error.why
+            unlearned |= dict.fromkeys(methods, error.why)
+            continue
+        for name in methods:
+            try:
+                with cost.of("learning"), _refusing(job, name):
+                    skills[name] = _learned(given[name], shown, job.folder / f"{name}.skill.json")
+            except Refused as error:
+                unlearned[name] = error.why
     return skills, unlearned
 
 
@@ -218,11 +226,16 @@ def _recorded(fixture: Path, plan: Plan) -> Recording:
     return record(fixture, plan.robot, teacher=looking, count=2, seed=plan.seed)
 
 
-def _learned(name: str, shown: list[Demonstration], folder: Path) -> Path:
-    path = folder / f"{name}.skill.json"
+def _removed(fixture: Path, folder: Path, plan: Plan) -> list[Demonstration]:
+    file = folder / "removal.npz"
+    if not file.exists():
+        record(fixture, plan.robot, teacher="disassembly", seed=plan.seed).save(file)
+    return demonstrations_of(file)
+
+
+def _learned(method: Method, shown: list[Demonstration], path: Path) -> Path:
     if not path.exists():
-        skill: LearnedSkill = METHODS[name](shown)
-        skill.save(path)
+        method(shown).save(path)
     return path
 
 

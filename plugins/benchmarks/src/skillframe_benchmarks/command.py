@@ -63,7 +63,6 @@ def automate(
     """
     from skillframe_benchmarks.assembly import LEVELS, AssemblyJob, Plan
     from skillframe_benchmarks.assets import pairs
-    from skillframe_benchmarks.methods import METHODS
 
     found = pairs(folder, assemblies)
     if only_list:
@@ -71,7 +70,7 @@ def automate(
     known = [level.name for level in LEVELS]
     plan = Plan(
         robot=robot, trials=trials, seed=seed, draws=seed if draws is None else draws,
-        methods=_chosen("method", methods, list(METHODS)), levels=_chosen("level", levels, known),
+        methods=_chosen("method", methods, list(Plan().methods)), levels=_chosen("level", levels, known),
     )  # fmt: skip
     agree(out, plan)
     jobs = [AssemblyJob(pair=pair, folder=(out / pair.name).resolve(), plan=plan) for pair in found]

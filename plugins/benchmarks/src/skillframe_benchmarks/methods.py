@@ -1,6 +1,6 @@
-"""Compared methods: an untaught push, a replay, and skills of two demonstrations.
+"""Compared methods: an untaught push, a replay, and skills of two demonstrations or of taking the part out.
 
-A method makes a skill from an assembly's demonstrations, with the same settings on all.
+A method makes a skill from an assembly's recordings, with the same settings on all.
 """
 
 from __future__ import annotations
@@ -72,8 +72,14 @@ def plain_spiral(document: Mapping[str, Any]) -> dict[str, Any]:
     return {**document, "phases": [document["phases"][0], search], "seat": seat}
 
 
+def removal(recordings: Sequence[Demonstration]) -> LearnedSkill:
+    """A straight push and the same search, learned from taking the part out, as `skillframe practise` does."""
+    return learn(recordings, "seat", removal=True)
+
+
 METHODS: Mapping[str, Method] = {
     "push": push, "push_spiral": push_spiral, "push_search": push_search, "lmc": lmc, "lmc_search": lmc_search,
     "replay": replay,
 }  # fmt: skip
 """Methods by name."""
+WITHOUT_DEMONSTRATION: Mapping[str, Method] = {"removal": removal}
