@@ -19,39 +19,17 @@ from typing import Any
 import numpy as np
 from skillframe_benchmarks.assembly import DONE, TRIALS, by_level
 from skillframe_parts.declared import read_fixture
-from skillframe_parts.fit import TOUCH, PartsFit, fit, thickness
+from skillframe_parts.fit import PartsFit, fit
+from skillframe_parts.free_direction import free_direction
 from skillframe_parts.solid import read_part
 
 from skillframe.errors import InputError
 from skillframe.frames import Float, rotation_matrix
 
-RAISED_M, FURTHER_M, LEAST_M, MOST_M = 3e-4, 5e-4, 2e-3, 3e-3
-DIRECTIONS = np.radians(np.arange(0.0, 180.0, 10.0))
 
-
-def slides(parts: PartsFit, along: Float) -> float:
-    """How far an assembled part, raised a little, goes along a unit vector (2,) before it overlaps the other [m]."""
-    there = 0.0
-    for way in np.arange(FURTHER_M, MOST_M + 1e-9, FURTHER_M):
-        moved = parts.plug.translate([float(way * along[0]), float(way * along[1]), RAISED_M])
-        if thickness(moved ^ parts.socket) > TOUCH:
-            break
-        there = float(way)
-    return there
-
-
-def unheld(parts: PartsFit) -> tuple[float, float, float]:
-    """The direction [rad] along which a part slides farthest both ways, how far, and how far it slides any way [m]."""
-    ways = np.stack([np.cos(DIRECTIONS), np.sin(DIRECTIONS)], axis=-1)
-    each = np.array([[slides(parts, way), slides(parts, -way)] for way in ways])
-    both = each.min(axis=1)
-    best = int(np.argmax(both))
-    return float(DIRECTIONS[best]), float(both[best]), float(each.max())
-
-
-def reached(rows: Sequence[Mapping[str, Any]], parts: PartsFit, direction: float, within: float) -> list[bool]:
-    """Whether the place of each row's draw lies so near [m] to the shown one along a direction [rad]."""
-    along, end = np.array([np.cos(direction), np.sin(direction), 0.0]), np.array([0.0, 0.0, -parts.depth])
+def reached(rows: Sequence[Mapping[str, Any]], parts: PartsFit, along: Float, within: float) -> list[bool]:
+    """Whether the place of each row's draw lies so near [m] to the shown one along a direction (3,)."""
+    end = np.array([0.0, 0.0, -parts.depth])
     found = []
     for row in rows:
         turn = rotation_matrix(np.array([row[f"fixture.tilt_{axis}"] for axis in "xyz"]))
@@ -75,16 +53,14 @@ def main() -> None:
         except InputError as error:
             print(f"{path.parent.name}: {error}", flush=True)
             continue
-        direction, way, one = unheld(parts)
-        if way < LEAST_M:
-            if one >= LEAST_M:
-                print(f"{path.parent.name}: slides {1e3 * one:.1f} mm one way", flush=True)
+        within = file.task.seated.sideways
+        if (along := free_direction(parts, within)) is None:
             continue
-        said = f"{path.parent.name}: slides {1e3 * way:.1f} mm both ways at {np.degrees(direction):.0f} degrees"
+        said = f"{path.parent.name}: slides both ways along {np.round(along, 2).tolist()}"
         plan = json.loads((path.parent / DONE).read_text(encoding="utf-8"))
         for level, rows in by_level(path.parent / TRIALS, plan["levels"], plan["trials"]).items():
             draws = {row["trial"]: row for row in rows}  # the same for every method
-            near = reached([*draws.values()], parts, direction, file.task.seated.sideways)
+            near = reached([*draws.values()], parts, along, within)
             said += f"; {level}: {sum(near)} of {len(near)} can be seated"
         print(said, flush=True)
 

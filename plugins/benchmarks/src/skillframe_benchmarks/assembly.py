@@ -149,7 +149,7 @@ def _run(job: AssemblyJob, cost: _Cost, tell: Callable[[str], None]) -> None:
 
 def _taught(job: AssemblyJob, fixture: Path, cost: _Cost) -> tuple[dict[str, Path], dict[str, str]]:
     """Skills by method, and why others were not learned."""
-    skills, unlearned = {}, {}
+    skills, unlearned = dict[str, Path](), dict[str, str]()
     for source, given in ((_shown, METHODS), (_removed, WITHOUT_DEMONSTRATION)):
         methods = [name for name in job.plan.methods if name in given]
         if not methods:

@@ -11,6 +11,7 @@ from typing import Any
 from skillframe.errors import InputError
 from skillframe_parts.checks import SHARE
 from skillframe_parts.declared import check_file, has_units
+from skillframe_parts.free_direction import free_direction
 from skillframe_parts.load import LoadedParts, PreparedPart, load
 
 FILE = """\
@@ -83,6 +84,7 @@ def values(loaded: LoadedParts) -> dict[str, Any]:
         "name": loaded.name, "axis": list(found.axis), "depth_m": found.depth, "clearance_m": found.clearance,
         "least_clearance_m": float(found.gaps.min()), "backend": loaded.backend,
         "contact_error_m": loaded.contact_error,
+        "free_direction": _free(loaded),
         "pieces": {"tool": _count(loaded.plug), "fixture": _count(loaded.socket)},
         "memory_bytes": loaded.plug.memory + loaded.socket.memory,
         "mass_kg": loaded.mass, "notes": list(loaded.notes), "sha256": dict(loaded.hashes),
@@ -102,8 +104,24 @@ def lines(loaded: LoadedParts) -> list[str]:
         f"contact by {_contact(loaded)}; contact error {1e6 * loaded.contact_error:.2g} um "
         f"(at most {1e6 * SHARE * found.clearance:.3g} um is let pass)",
         f"{plug} weighs " + (f"{1000.0 * loaded.mass:.3g} g" if loaded.mass < 1.0 else f"{loaded.mass:.3g} kg"),
+        *_unheld(loaded),
         *(f"note: {note}" for note in loaded.notes),
     ]  # fmt: skip
+
+
+def _free(loaded: LoadedParts) -> list[float] | None:
+    free = free_direction(loaded.fit, loaded.file.task.seated.sideways)
+    return None if free is None else (free @ loaded.fit.turn).round(6).tolist()
+
+
+def _unheld(loaded: LoadedParts) -> list[str]:
+    if (free := _free(loaded)) is None:
+        return []
+    along, by = ", ".join(f"{x + 0.0:.2g}" for x in free), 1000.0 * loaded.file.task.seated.sideways
+    return [
+        f"assembled, {loaded.file.tool.mesh} slides freely by {by:.2g} mm both ways along ({along}): touch does "
+        "not show its place there, so that a skill relies on the place that it was taught"
+    ]
 
 
 def _contact(loaded: LoadedParts) -> str:

@@ -1,0 +1,34 @@
+"""Directions across the way in which nothing holds an assembled part.
+
+A part that slides freely both ways farther than *seated* allows shows nobody by touch where it belongs along them: a
+skill can only rely on the demonstrated place, and its "seated" says nothing about it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from skillframe.frames import Float
+from skillframe_parts.fit import TOUCH, PartsFit, thickness
+
+RAISED_M, STEP_M = 3e-4, 5e-4
+"""Height over the end in which it slides, off the bottom, and distance after which it is looked at again."""
+DIRECTIONS = np.radians(np.arange(0.0, 180.0, 10.0))
+
+
+def free_direction(fit: PartsFit, far: float) -> Float | None:
+    """Direction (3,) in the fixture frame in which the assembled part slides by `far` [m] both ways, or None.
+
+    Of several, their mean, in which opposite directions are the same.
+    """
+    steps = [*np.arange(STEP_M, far, STEP_M).tolist(), far]
+    free = [all(_passes(fit, angle, way * step) for way in (1, -1) for step in steps) for angle in DIRECTIONS]
+    if not any(free):
+        return None
+    angle = 0.5 * np.angle(np.exp(2j * DIRECTIONS[free]).sum())
+    return np.array([np.cos(angle), np.sin(angle), 0.0])
+
+
+def _passes(fit: PartsFit, angle: float, by: float) -> bool:
+    moved = fit.plug.translate([float(by * np.cos(angle)), float(by * np.sin(angle)), RAISED_M])
+    return thickness(moved ^ fit.socket) <= TOUCH
