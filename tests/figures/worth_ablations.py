@@ -33,13 +33,6 @@ def _by_length(given: pieces.Pieces, whole: float) -> posterior.Witnesses:
     return posterior._merged(given, given.length / whole)
 
 
-def _single(given: pieces.Pieces, whole: float) -> posterior.Witnesses:
-    """Weights as they are, and every piece's own directions in place of the means of those alike."""
-    own = posterior._merged
-    with replaced((posterior, "_merged", lambda mean, weight: own(given, weight))):
-        return WITNESSES(given, whole)
-
-
 def _hard_near_edge(D: Float, given: pieces.Pieces) -> Any:
     """Before the near edge a push explains as little as beyond the far one."""
     result = EXPLAINED(D, given)
@@ -51,7 +44,7 @@ def _hard_near_edge(D: Float, given: pieces.Pieces) -> Any:
     return result
 
 
-WITNESSES, EXPLAINED, DECIDE = posterior.witnesses, posterior.explained, posterior.decide
+EXPLAINED, DECIDE = posterior.explained, posterior.decide
 
 
 def _peak(seen: posterior.Witnesses, exists: float) -> posterior.Choice:
@@ -68,7 +61,6 @@ LEFT_OUT: dict[str, Sequence[Replaced]] = {
     "hand's push in turns": [(posterior, "HELD", 1e6)],
     "soft near edge": [(posterior, "explained", _hard_near_edge)],
     "one witness a contact": [(learner, "witnesses", _by_length)],
-    "means of what is alike": [(learner, "witnesses", _single)],
     "balance of demonstrations": [(posterior, "_balance", lambda alike, given, weight: 1.0)],
     "middle of the plateau": [(learner, "decide", _peak)],
     "axis square to turn and push": [(axes.CompliantAxes, "square_to", lambda self, turn, push: self)],
