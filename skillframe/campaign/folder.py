@@ -187,6 +187,8 @@ def _copy_robot_file(source: Path, target: Path) -> str:
         for fmu in {str(row.get("fmu")) for row in given.get("actuation", []) if isinstance(row, dict)}:
             if (source.parent / fmu).is_file():  # otherwise a name in fmus/
                 _copy_beside(source, place, fmu, "fmu")
+        if isinstance(file := given.get("parameter_set"), str) and (source.parent / file).is_file():
+            _copy_beside(source, place, file, "parameter_set")
     else:
         _copy_meshes(source, place / source.name, target / "robots")
     return (place / source.name).relative_to(target).as_posix()

@@ -60,11 +60,19 @@ def drive_of(spec: RobotSpec) -> DriveType | None:
 
 
 def written_out(values: dict[str, Any], path: Path) -> dict[str, Any]:
-    """Content of the robot.toml at `path` with short tables of drives as those of the core. Raises `InputError`."""
+    """Content of the robot.toml at `path` with short tables of drives as those of the core, and its parameter set.
+
+    Raises:
+        InputError: a table in the wrong form, or as `skillframe.fmu.ssv.with_parameter_set`.
+    """
     for record in registry().records("drive"):
         if record.write_out is not None:
             values = record.write_out(values, path)
-    return values
+    if "parameter_set" not in values:
+        return values
+    from skillframe.fmu.ssv import with_parameter_set
+
+    return with_parameter_set(values, path)
 
 
 def require_driven(model: RobotModel) -> None:

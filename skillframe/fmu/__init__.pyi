@@ -15,6 +15,8 @@ from .build import fmu_folders as fmu_folders
 from .opening import kept as kept
 from .opening import open_actuators as open_actuators
 from .opening import unmapped as unmapped
+from .ssp import Component as Component
+from .ssp import write_ssp as write_ssp
 from .table import VariableTable as VariableTable
 from .table import read_table as read_table
 from .table import rows as rows

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +51,7 @@ class FmuFacts:
         variables: by name, without locals if read in a child.
         token, identifier, needs_tool: instantiation token, library name, whether its tool is needed.
         source_files, definitions: C sources and compiler options.
+        units: by name, the attributes of a unit's BaseUnit that are not the default: SI exponents, factor, offset.
     """
 
     path: Path
@@ -71,6 +72,7 @@ class FmuFacts:
     needs_tool: bool = False
     source_files: tuple[str, ...] = ()
     definitions: tuple[str, ...] = ()
+    units: dict[str, dict[str, float]] = field(default_factory=dict)
 
     def names(self, causality: str) -> list[str]:
         """Names of the variables of a causality, in order."""

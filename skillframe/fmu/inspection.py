@@ -116,6 +116,7 @@ def _inspect(path: Path, digest: str) -> FmuFacts:
         needs_tool=bool(cs and cs.needsExecutionTool),
         source_files=files,
         definitions=definitions,
+        units={unit.name: _base_unit(unit.baseUnit) for unit in description.unitDefinitions if unit.baseUnit},
     )
 
 
@@ -205,6 +206,11 @@ def _sources(description: Any, identifier: str) -> tuple[tuple[str, ...], tuple[
 
 def _line(error: Exception) -> str:
     return " ".join(str(error).split())[:300]
+
+
+def _base_unit(base: Any) -> dict[str, float]:
+    named = {name: getattr(base, name) for name in ("kg", "m", "s", "A", "K", "mol", "cd", "rad", "factor", "offset")}
+    return {name: value for name, value in named.items() if value not in (0, float(name == "factor"))}
 
 
 def _variable(v: Any) -> FmuVariable:

@@ -94,6 +94,7 @@ class RobotFile:
     Attributes:
         urdf: file of the robot, from the folder of robot.toml.
         summary: one line for people.
+        parameter_set: a file of SSP (.ssv or .ssp) whose values replace those of `actuation`.
     """
 
     urdf: Path
@@ -118,6 +119,7 @@ class RobotFile:
     passive: tuple[Passive, ...] = ()
     drive: DeclaredDrive | None = None
     actuation: tuple[Actuation, ...] = ()
+    parameter_set: Path | None = None
     collisions: DeclaredCollisions = field(default_factory=DeclaredCollisions)
     obstacle: tuple[Obstacle, ...] = ()
 
@@ -241,7 +243,7 @@ def _named_folders() -> dict[str, Path]:
 
 def _from_toml(path: Path) -> RobotSpec:
     values, known = read_toml(path), {each.name for each in fields(RobotFile)}
-    for write_out in WRITES_OUT if values.keys() - known else ():
+    for write_out in WRITES_OUT if values.keys() - (known - {"parameter_set"}) else ():
         values = write_out(values, path)
     values = in_si(values, path)
     drive = values.get("drive")

@@ -44,7 +44,7 @@ LOOP = {
     "cosim",
     "execution",
 }
-SET_UP = {  # finds, builds and unpacks FMUs before a run, simulates one alone, holds a foreign one in its own process
+SET_UP = {  # finds, builds and unpacks FMUs before a run, simulates or exports them, holds a foreign one in its process
     f"skillframe/fmu/{name}.py"
     for name in (
         "build",
@@ -55,6 +55,7 @@ SET_UP = {  # finds, builds and unpacks FMUs before a run, simulates one alone, 
         "keeper",
         "library",
         "simulate",
+        "ssp",
         "worker",
     )
 } | {f"skillframe/execution/{name}.py" for name in ("prepare", "scores", "trace")}  # before a run, and after it

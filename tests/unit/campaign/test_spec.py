@@ -194,9 +194,13 @@ def test_fmu_files_beside_a_robot_are_copied_and_named_ones_are_not(campaign, tm
     path = campaign(trials=4)
     robot, rows = tmp_path / "robots" / "box" / "robot.toml", '[[actuation]]\njoint = "j"\nfmu = "{}"\n'
     (robot.parent / "own.fmu").write_bytes(b"own")
-    robot.write_text('urdf = "box.urdf"\n' + rows.format("own.fmu") + rows.format("hydraulic_cylinder"))
+    (robot.parent / "own.ssv").write_bytes(b"own")
+    head = 'urdf = "box.urdf"\nparameter_set = "own.ssv"\n'
+    robot.write_text(head + rows.format("own.fmu") + rows.format("hydraulic_cylinder"))
     spec = prepare(read(path), tmp_path / "out", lambda spec: {}, FakeParams)
-    assert sorted(p.name for p in (spec.folder / spec.robot).parent.iterdir()) == ["box.urdf", "own.fmu", "robot.toml"]
+    assert sorted(p.name for p in (spec.folder / spec.robot).parent.iterdir()) == [
+        "box.urdf", "own.fmu", "own.ssv", "robot.toml",
+    ]  # fmt: skip
     (tmp_path / "far.fmu").write_bytes(b"far")
     robot.write_text('urdf = "box.urdf"\n' + rows.format("../../far.fmu"))
     with pytest.raises(InputError, match="lies outside the robot's folder"):
