@@ -3,6 +3,7 @@
 import re
 import shutil
 import tomllib
+import zipfile
 from dataclasses import fields
 from itertools import pairwise
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from skillframe_hydraulics.declared import Gains, MachineNoise
 from skillframe_hydraulics.law.vdc_actuator import cylinders
 
+from skillframe.cli.main import run
 from skillframe.errors import InputError
 from skillframe.extend.drives import audit
 from skillframe.robot.model import load_model
@@ -68,6 +70,27 @@ def test_each_figure_that_the_page_gives_is_one_that_the_controller_needs():
 def test_the_tables_of_sensors_and_gains_show_the_defaults():
     shown = tomllib.loads(block(CRANE, "toml", "[sensors]") + block(CRANE, "toml", "[gains]"))
     assert (MachineNoise(**shown["sensors"]), Gains(**shown["gains"])) == (MachineNoise(), Gains())
+
+
+@pytest.mark.slow
+def test_the_system_of_fmus_of_the_crane_page_runs_and_its_parameters_come_back(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert run(re.search(r"^skillframe (fmu export .*)", CRANE, re.MULTILINE)[1].split()) == 0
+    exec(compile(block(CRANE, "python", "simulate_ssp"), "own-crane.md", "exec"), {})
+    printed = capsys.readouterr().out.splitlines()[-1]
+    assert f"prints `{printed}`" in CRANE
+    folder = tmp_path / "my_crane"
+    shutil.copytree(robot_names()["hiab_xs031"], folder)
+    robot = folder / "robot.toml"
+    robot.write_text(block(CRANE, "toml", "parameter_set") + robot.read_text(encoding="utf-8"), encoding="utf-8")
+    with zipfile.ZipFile("crane.ssp") as archive:
+        values = archive.read("resources/parameters.ssv").decode()
+    own = folder / "crane.ssv"
+    own.write_text(values.replace('"19000000.0" unit="Pa"', '"180" unit="bar"'))
+    assert [each.parameters["supply_pressure"] for each in load_robot(folder).actuation] == [180e5] * 3
+    own.write_text(values.replace('"19000000.0" unit="Pa"', '"180" unit="m"'))
+    assert run(["robots", "my_crane/"]) == 2
+    assert f"```\n{capsys.readouterr().err.replace(f'{tmp_path}/', '')}```" in CRANE
 
 
 def test_the_python_of_the_crane_page_runs(capsys):

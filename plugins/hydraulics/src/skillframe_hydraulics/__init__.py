@@ -8,9 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from skillframe import hookimpl
-from skillframe.extend import DriveType, Lazy
+from skillframe.extend import DriveType, Lazy, LazyCommand
 
 skillframe_contract = "0.2"
+
+export_command = LazyCommand("Write a machine as a system of FMUs (SSP).", "skillframe_hydraulics.export:command")
 
 
 @hookimpl
