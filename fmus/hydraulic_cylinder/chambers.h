@@ -20,20 +20,44 @@ typedef struct {
 /* A motor turns: its chambers keep their volumes, and it has no ends. */
 static inline int is_motor(const Model *m) { return m->value[DISPLACEMENT] > 0.0; }
 
+/* Conductance of the counterbalance valve at a chamber's port, and its derivatives; negative: no valve. README eq. 13. */
+typedef struct { double open, by[2]; } Held;
+
+static inline Held held_at(const Model *m, int at, const double p[2])
+{
+    const double *v = m->value;
+    double setting = v[at == A ? COUNTERBALANCE_A : COUNTERBALANCE_B];
+    Held h = {-1.0, {0.0, 0.0}};
+    if (setting <= 0.0) return h;
+    double lift = (p[at] + v[PILOT_RATIO] * p[1 - at] - setting) / v[COUNTERBALANCE_RANGE];
+    h.open = m->own.counterbalance * clip(lift, 0.0, 1.0);
+    if (lift > 0.0 && lift < 1.0) {
+        h.by[at] = m->own.counterbalance / v[COUNTERBALANCE_RANGE];
+        h.by[1 - at] = v[PILOT_RATIO] * h.by[at];
+    }
+    return h;
+}
+
 /* Flow through one open edge, from the side of higher `dp` on; all derivatives. */
-typedef struct { double flow, by_dp, by_time; } Edge;
+typedef struct { double flow, by_dp, by_time, by_held; } Edge;
 
 static inline Edge through_edge(const Model *m, double opening, double opening_rate, double dp, double closing,
-                                double closing_rate)
+                                double closing_rate, double held)
 {
+    double bent = 0.0;
     double c = m->own.edge * opening, c_rate = m->own.edge * opening_rate;
     if (closing > 0.0 && dp > 0.0) {   /* in series with the cushion's throttle, README eq. 6 */
         double q = c * closing / m->own.cushion, bend = 1.0 / ((1.0 + q * q) * sqrt(1.0 + q * q));
         c_rate = bend * (c_rate - c * q * c / m->own.cushion * closing_rate);
         c /= sqrt(1.0 + q * q);
     }
+    if (held >= 0.0 && dp > 0.0) {   /* in series with the counterbalance valve, README eq. 13 */
+        double q = c / held, bend = held > 0.0 ? 1.0 / sqrt(1.0 + q * q) : 0.0;
+        c *= bend, c_rate *= bend * bend * bend;
+        bent = held > 0.0 ? c / held * (c / held) * (c / held) : 0.0;
+    }
     Curve law = edge_law(dp, m->value[LAMINAR_PRESSURE]);
-    Edge e = {c * law.y, c * law.slope, c_rate * law.y};
+    Edge e = {c * law.y, c * law.slope, c_rate * law.y, bent * law.y};
     return e;
 }
 
@@ -59,11 +83,16 @@ static inline void valve(const Model *m, const Motion *w, const double p[2], Cha
     double wide_in = v[feeds == A ? EDGE_PA : EDGE_PB], wide_out = v[drains == A ? EDGE_AT : EDGE_BT];
     double drop = v[SUPPLY_PRESSURE] - v[SUPPLY_DROP] - p[feeds];
     Edge in = {0.0, 0.0, 0.0};
-    if (drop >= 0.0 || v[FEED_CHECK] == 0.0) in = through_edge(m, wide_in * open, wide_in * rate, drop, 0.0, 0.0);
+    if (drop >= 0.0 || (v[FEED_CHECK] == 0.0 && held_at(m, feeds, p).open < 0.0))
+        in = through_edge(m, wide_in * open, wide_in * rate, drop, 0.0, 0.0, -1.0);
     double room = drains == A ? w->position : v[STROKE] - w->position;
     cushion_of(m, room, drains == A ? w->velocity : -w->velocity, &closing, &closing_rate);
-    Edge out = through_edge(m, wide_out * open, wide_out * rate, p[drains] - v[RETURN_PRESSURE], closing, closing_rate);
+    Held held = held_at(m, drains, p);
+    Edge out = through_edge(m, wide_out * open, wide_out * rate, p[drains] - v[RETURN_PRESSURE], closing, closing_rate,
+                            held.open);
     by[feeds][feeds] -= in.by_dp, drift[feeds] += in.by_time;
+    if (held.open >= 0.0)
+        for (int j = A; j <= B; j++) by[drains][j] -= out.by_held * held.by[j];
     by[drains][drains] -= out.by_dp, drift[drains] -= out.by_time;
     c->flow_a = feeds == A ? in.flow : -out.flow;
     c->flow_b = feeds == B ? in.flow : -out.flow;
@@ -88,6 +117,27 @@ static inline double burst(const double *v, double area, double p, double *slope
     return -area * HOLE * law.y;
 }
 
+/* Out of a hose before a counterbalance valve, README eq. 13: the spool's flow `fed` first, with its slope `fed_by`, then
+ * what the valve passes. */
+static inline double held_burst(const Model *m, int at, double area, const double p[2], double fed, double fed_by,
+                                double by[2], double *drift)
+{
+    const double *v = m->value;
+    Held held = held_at(m, at, p);
+    if (!(area > 0.0) || held.open < 0.0 || p[at] <= 0.0) return burst(v, area, p[at], &by[at]);
+    Curve law = edge_law(p[at], v[LAMINAR_PRESSURE]);
+    if (fed >= area * HOLE * law.y) return burst(v, area, p[at], &by[at]);
+    double q = area * HOLE / held.open, c = held.open > 0.0 ? area * HOLE / sqrt(1.0 + q * q) : 0.0;
+    if (fed > c * law.y) {
+        by[at] -= fed_by, *drift = 0.0;
+        return -fed;
+    }
+    double bent = held.open > 0.0 ? c / held.open * (c / held.open) * (c / held.open) : 0.0;
+    for (int j = A; j <= B; j++) by[j] -= bent * law.y * held.by[j];
+    by[at] -= c * law.slope;
+    return -c * law.y;
+}
+
 static inline void chambers(const Model *m, const Motion *w, const double p[2], Chambers *c)
 {
     const double *v = m->value;
@@ -100,9 +150,10 @@ static inline void chambers(const Model *m, const Motion *w, const double p[2], 
     valve(m, w, p, c, by, drift);
     double leak = v[LEAKAGE] * (p[A] - p[B]);
     for (int i = A; i <= B; i++) {
-        double sign = i == A ? 1.0 : -1.0, net = (i == A ? c->flow_a : c->flow_b) - sign * leak;
+        double sign = i == A ? 1.0 : -1.0, flow = i == A ? c->flow_a : c->flow_b, net = flow - sign * leak;
+        double fed_by = by[i][i];
         net += ports(v, p[i], &by[i][i]) - area[i] * w->velocity;
-        net += burst(v, i == A ? v[BURST_A] : v[BURST_B], p[i], &by[i][i]);
+        net += held_burst(m, i, i == A ? v[BURST_A] : v[BURST_B], p, flow, fed_by, by[i], &drift[i]);
         by[i][i] -= v[LEAKAGE], by[i][1 - i] += v[LEAKAGE];
         Curve bulk = bulk_law(p[i], v[BULK_MODULUS], v[BULK_MODULUS_SLOPE], v[AIR_FRACTION]);
         double gain = bulk.y / volume[i];

@@ -33,12 +33,12 @@ static inline Outcome check_parameters(const Model *m, Report *r)
 {
     static const int positive[] = {BORE, STROKE, DEAD_VOLUME_A, DEAD_VOLUME_B, BULK_MODULUS, RATED_FLOW,
                                    RATED_PRESSURE_DROP, EDGE_PA, EDGE_PB, EDGE_AT, EDGE_BT, SPOOL_FREQUENCY, SPOOL_DAMPING, LAMINAR_PRESSURE,
-                                   STRIBECK_VELOCITY, PRESLIDING_LENGTH, CUSHION_FLOW,
+                                   STRIBECK_VELOCITY, PRESLIDING_LENGTH, CUSHION_FLOW, PILOT_RATIO, COUNTERBALANCE_FLOW, COUNTERBALANCE_DROP, COUNTERBALANCE_RANGE,
                                    SUBSTEP, TOLERANCE};
     static const int not_negative[] = {DISPLACEMENT, ROD, BULK_MODULUS_SLOPE, AIR_FRACTION, SPOOL_SLEW, DEADBAND, HYSTERESIS, LEAKAGE,
                                        COULOMB_FRICTION, VISCOUS_FRICTION, STATIC_FRICTION,
                                        ENDSTOP_STIFFNESS, ENDSTOP_DAMPING, CUSHION_LENGTH, RELIEF_CONDUCTANCE,
-                                       CHECK_CONDUCTANCE};
+                                       CHECK_CONDUCTANCE, COUNTERBALANCE_A, COUNTERBALANCE_B};
     const double *v = m->value;
     Outcome out = OK;
     for (size_t i = 0; i < sizeof positive / sizeof *positive && out == OK; i++) out = POSITIVE(positive[i]);
@@ -47,6 +47,9 @@ static inline Outcome check_parameters(const Model *m, Report *r)
     if (out == OK) out = require(v[ROD] < v[BORE], "rod", "smaller than bore", v[ROD], r);
     if (out == OK) out = require(v[AIR_FRACTION] < 0.5, "air_fraction", "below 0.5", v[AIR_FRACTION], r);
     if (out == OK) out = require(v[DEADBAND] < 1.0, "deadband", "below 1", v[DEADBAND], r);
+    if (out == OK)
+        out = require(v[COUNTERBALANCE_A] == 0.0 || v[COUNTERBALANCE_B] == 0.0, "counterbalance_b",
+                      "0 beside counterbalance_a: a cylinder has one counterbalance valve", v[COUNTERBALANCE_B], r);
     if (out == OK) out = require(v[SUBSTEP] >= 1e-6, "substep", "at least 1e-6 s", v[SUBSTEP], r);
     if (out == OK)
         out = require(v[SUPPLY_PRESSURE] > v[RETURN_PRESSURE], "supply_pressure", "above return_pressure",

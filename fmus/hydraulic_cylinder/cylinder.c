@@ -117,6 +117,7 @@ static void derive(Model *m)
     if (is_motor(m)) m->own.area_a = m->own.area_b = v[DISPLACEMENT];
     m->own.edge = v[RATED_FLOW] / sqrt(drop);
     m->own.cushion = v[CUSHION_FLOW] / sqrt(v[RATED_PRESSURE_DROP]);
+    m->own.counterbalance = v[COUNTERBALANCE_FLOW] / sqrt(v[COUNTERBALANCE_DROP]);
     m->own.omega = 2.0 * PI * v[SPOOL_FREQUENCY];
     m->own.stiffness = v[COULOMB_FRICTION] / v[PRESLIDING_LENGTH];
 }

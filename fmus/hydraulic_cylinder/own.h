@@ -4,7 +4,7 @@
 
 typedef struct {
     /* from parameters */
-    double area_a, area_b, edge, cushion, omega, stiffness;
+    double area_a, area_b, edge, cushion, counterbalance, omega, stiffness;
     /* the command the spool follows: from `demand` at `demand_time` to `target`, no faster than spool_slew */
     double target, demand, demand_time;
     /* piston motion the outputs are for */

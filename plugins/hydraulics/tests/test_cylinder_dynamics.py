@@ -19,6 +19,7 @@ CASES = {
     "everything": SMALL
     | {"deadband": 0.1, "hysteresis": 0.02, "air_fraction": 0.01, "static_friction": 6000.0, "cushion_length": 0.35},
     "check valve": SMALL | {"feed_check": 1.0, "supply_pressure": 45e5},
+    "counterbalance": SMALL | {"counterbalance_a": 250e5, "pilot_ratio": 2.0, "edge_at": 4.0, "deadband": 0.05},
     "unequal edges": SMALL | {"edge_pa": 0.5, "edge_pb": 0.7, "edge_at": 2.0, "edge_bt": 1.5},
 }
 
@@ -87,12 +88,13 @@ def test_the_python_reference_and_the_fmu_agree(cylinder2, reference):
     swing, rng = Swing(), np.random.default_rng(1)
     sets = [CASES["published"], CASES["published"] | {"deadband": 0.05, "hysteresis": 0.02, "air_fraction": 0.01}]
     sets.append(CASES["unequal edges"] | {"dead_volume_a": 3e-3, "dead_volume_b": 3e-3, "feed_check": 1.0})
+    sets.append(CASES["counterbalance"] | {"dead_volume_a": 3e-3, "dead_volume_b": 3e-3, "cushion_length": 0.35})
     both = [bank(cylinder2, *sets), reference(sets)]
     for b in both:
         b.u[:, 1:3] = swing.at(0.0)[:2]
         b.start()
     for k in range(150):
-        command = rng.uniform(-0.5, 0.5, 3) if k % 30 == 0 else both[0].u[:, 0].copy()
+        command = rng.uniform(-0.5, 0.5, len(sets)) if k % 30 == 0 else both[0].u[:, 0].copy()
         for b in both:
             b.u[:, 0] = command
             b.u[:, 1:4] = swing.at(k * H)

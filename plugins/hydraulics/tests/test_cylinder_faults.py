@@ -71,13 +71,16 @@ def test_a_lost_supply_lets_a_chamber_drain_backwards_through_an_open_valve(make
     assert abs(bank.y[0, FLOW_A]) < 1e-6
 
 
-def test_fmu_and_reference_lose_their_oil_alike(cylinder2):
+@pytest.mark.parametrize("own", [{}, {"counterbalance_a": 300e5, "pilot_ratio": 3.5}])
+@pytest.mark.parametrize("command", [0.2, -0.2])
+def test_fmu_and_reference_lose_their_oil_alike(cylinder2, own, command):
     table = read_table(fmu_folders()["hydraulic_cylinder"])
-    fmu, twin = FmuBank(specs(), [cylinder2]), ReferenceBank(specs(), table)
+    fmu, twin = FmuBank(specs(**own), [cylinder2]), ReferenceBank(specs(**own), table)
     for bank in (fmu, twin):
-        bank.u[0] = 0.2, 0.3, 0.0, 0.0, 0.0, 3e-5, 20e5
+        bank.u[0] = command, 0.3, 0.0, 0.0, 1e-6 if own else 0.0, 3e-5, 20e5
         bank.start()
         for k in range(50):
             assert bank.step(k * H, H)
-    # both integrators keep to 10 Pa of a converged solution each (test_cylinder_dynamics), of 1e7 Pa
-    np.testing.assert_allclose(fmu.y[0, [PA, PB]], twin.y[0, [PA, PB]], rtol=0, atol=20.0)
+    # both integrators keep to 10 Pa of a converged solution each (test_cylinder_dynamics), of 1e7 Pa; where a
+    # valve shuts within a step of the reference, to 1e-4 of it
+    np.testing.assert_allclose(fmu.y[0, [PA, PB]], twin.y[0, [PA, PB]], rtol=0, atol=1e3 if own else 20.0)

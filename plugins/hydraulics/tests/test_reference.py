@@ -16,7 +16,8 @@ EVERYTHING = SMALL | {
     "deadband": 0.1, "hysteresis": 0.02, "air_fraction": 0.01, "static_friction": 6000.0, "cushion_length": 0.35
 }  # fmt: skip
 PLAIN = [{}, {"deadband": 0.05, "supply_pressure": 15e6}, {"coulomb_friction": 1000.0, "static_friction": 1000.0}]
-MIXED = [EVERYTHING, {}, SMALL | {"edge_pa": 0.5, "edge_bt": 2.0}]
+HELD = SMALL | {"counterbalance_b": 250e5, "pilot_ratio": 2.0, "edge_bt": 4.0}
+MIXED = [EVERYTHING, {}, SMALL | {"edge_pa": 0.5, "edge_bt": 2.0}, HELD]
 
 
 def bank(sets, **settings):
@@ -51,9 +52,10 @@ def test_expressions_and_arrays_give_the_same_cylinder(sets):
 @pytest.mark.parametrize("symbolic", [True, False])
 @pytest.mark.slow
 def test_a_cylinders_numbers_do_not_depend_on_those_beside_it(symbolic):
-    commands = np.random.default_rng(4).uniform(-1.0, 1.0, (4, 3))
-    together = history(bank(PLAIN, symbolic=symbolic), 60, commands)
-    for i, one in enumerate(PLAIN):
+    sets = [*PLAIN, HELD]
+    commands = np.random.default_rng(4).uniform(-1.0, 1.0, (4, len(sets)))
+    together = history(bank(sets, symbolic=symbolic), 60, commands)
+    for i, one in enumerate(sets):
         alone = history(bank([one], symbolic=symbolic), 60, commands[:, i : i + 1])
         np.testing.assert_array_equal(together[:, i], alone[:, 0])
 

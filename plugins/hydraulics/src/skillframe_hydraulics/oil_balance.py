@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import casadi as ca
+import numpy as np
 
 from skillframe.frames import Float
+from skillframe_hydraulics.counterbalance import conductances, narrowing
 from skillframe_hydraulics.law.vdc_actuator import Cylinders, chamber_lengths
 from skillframe_hydraulics.symbolic_or_numeric import copysign, maximum, minimum
 
@@ -27,6 +29,7 @@ class Bounds:
             because early fits can be wrong by 16 bar with a small standard deviation [Pa].
         alike: share of another motion below which one is negligible.
         spread: standard deviations of supply and overlap.
+        setting: by which a counterbalance valve may open late or early [Pa].
         spool_floor, spool_share: for misplaced spools, motion [m] and share of the flow.
         excess, missed: s_1 and s_2 [m]; fast, slow: checks per sum of (3).
     """
@@ -44,6 +47,7 @@ class Bounds:
     unsure: float = 1e6
     alike: float = 0.25
     spread: float = 2.0
+    setting: float = 1e6
     spool_floor: float = 1e-4
     spool_share: float = 0.1
     excess: float = 0.05
@@ -92,12 +96,15 @@ def balance_function(c: Cylinders, period: float) -> ca.Function:
     sure = swung.unsure <= BOUNDS.unsure
     supply = ca.if_else(sure, swung.supply, maximum(swung.supply, c.supply_pressure))
     spread = ca.if_else(sure, BOUNDS.spread * swung.unsure, 0.0)
+    check_a = check_b = c.feed_check
+    if own := c.counterbalance:
+        check_a, check_b = np.maximum(check_a, own.holds_a), np.maximum(check_b, own.holds_b)
     ends = {
         laminar: [
             _edge(c, pressure, fills, supply - spread if laminar else supply + spread, laminar, shares)
             for pressure, fills, shares in (
-                (p_a, valve > 0.0, (c.edge_pa, c.edge_at)),
-                (p_b, valve <= 0.0, (c.edge_pb, c.edge_bt)),
+                (p_a, valve > 0.0, (c.edge_pa, c.edge_at, check_a)),
+                (p_b, valve <= 0.0, (c.edge_pb, c.edge_bt, check_b)),
             )
         ]
         for laminar in (True, False)
@@ -108,9 +115,17 @@ def balance_function(c: Cylinders, period: float) -> ca.Function:
         (swung.most, swung.ratio, True), (swung.least, swung.ratio, False),
     ):  # fmt: skip
         opening = minimum(maximum(ca.fabs(valve) - overlap, 0.0) / (1.0 - overlap), 1.0) * ratio
-        volumes += [period * c.edge * opening * each for each in ends[laminar]]
-    passed = ca.horzcat(*map(ca.fabs, volumes[2:4]), *volumes)
-    told, seen = ca.horzcat(passed + sums[:, :10], sums[:, :-10]), ca.horzcat(piston, p_a, p_b, readings[:, :-3])
+        passed = [period * c.edge * opening * each for each in ends[laminar]]
+        if own:  # that opens late, or early
+            off = BOUNDS.setting if laminar else -BOUNDS.setting
+            late = replace(own, **{at: getattr(own, at) + off for at in ("counterbalance_a", "counterbalance_b")})
+            passed = [
+                volume * ca.if_else(volume < 0.0, narrowing(c.edge * opening * wide, held), 1.0)
+                for volume, wide, held in zip(passed, (c.edge_at, c.edge_bt), conductances(late, p_a, p_b), strict=True)
+            ]
+        volumes += passed
+    sizes = ca.horzcat(*map(ca.fabs, volumes[2:4]), *volumes)
+    told, seen = ca.horzcat(sizes + sums[:, :10], sums[:, :-10]), ca.horzcat(piston, p_a, p_b, readings[:, :-3])
     gone = seen[:, :3] - seen[:, 3 * BOUNDS.window : 3 * BOUNDS.window + 3]
     lagged, begun = 10 * BOUNDS.lags[0], 10 * (BOUNDS.lags[0] + BOUNDS.window)
     usual = told[:, lagged : lagged + 10] - told[:, begun : begun + 10]
@@ -126,14 +141,15 @@ def balance_function(c: Cylinders, period: float) -> ca.Function:
 
 
 def _edge(
-    c: Cylinders, pressure: ca.SX, fills: ca.SX, supply: ca.SX, laminar: bool, shares: tuple[Float, Float]
+    c: Cylinders, pressure: ca.SX, fills: ca.SX, supply: ca.SX, laminar: bool, shares: tuple[Float, Float, Float]
 ) -> ca.SX:  # fmt: skip
     """Root of the pressure drop into a chamber from the supply, or out of it [sqrt(Pa)], optionally laminar.
 
-    It is times the edge's share of the rated conductance, of `shares` for flow in and flow out.
+    It is times the edge's share of the rated conductance, of `shares` for flow in and flow out. The third is 1 with a
+    check valve.
     """
     drop = ca.if_else(fills, supply - pressure, c.return_pressure - pressure)
-    shut = c.feed_check * (pressure - supply) > 0.0
+    shut = shares[2] * (pressure - supply) > 0.0
     share = ca.if_else(fills, ca.if_else(shut, 0.0, shares[0]), shares[1])
     if laminar:
         return share * (drop / ca.sqrt(ca.sqrt(drop * drop + c.laminar_pressure**2)))

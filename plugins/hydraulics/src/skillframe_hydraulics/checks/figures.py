@@ -18,6 +18,7 @@ from skillframe.errors import InputError, UnknownName
 from skillframe.files import data_dirs
 from skillframe.robot import Actuation, Limits, RobotModel, published_inertia
 from skillframe_hydraulics.checks.plausible import CYLINDER_RULES, MACHINE_RULES, Doubt, doubts
+from skillframe_hydraulics.counterbalance import DEFAULTS
 from skillframe_hydraulics.declared import noise_of
 
 CYLINDER = "hydraulic_cylinder"
@@ -29,18 +30,20 @@ NEEDED = (
 """Figures that the controller needs of a cylinder."""
 EDGES = ("edge_pa", "edge_pb", "edge_at", "edge_bt")
 SWITCHES = ("rated_drop_is_per_edge", "feed_check")
-OPTIONAL = ("laminar_pressure", "deadband", "presliding_length", *SWITCHES, *EDGES)
+OPTIONAL = ("laminar_pressure", "deadband", "presliding_length", *SWITCHES, *EDGES, *DEFAULTS)
 """Figures that the controller uses, with defaults."""
 _OURS = frozenset((*NEEDED, *OPTIONAL, "displacement"))
 POSITIVE = frozenset({
     "bore", "stroke", "dead_volume_a", "dead_volume_b", "bulk_modulus", "rated_flow", "rated_pressure_drop",
     "supply_pressure", "laminar_pressure", *EDGES, "presliding_length", "spool_frequency", "spool_damping",
     "stribeck_velocity", "cushion_flow", "substep", "tolerance",
+    "pilot_ratio", "counterbalance_flow", "counterbalance_drop", "counterbalance_range",
 })  # fmt: skip
 NOT_NEGATIVE = frozenset({
     "displacement", "rod", "leakage", "coulomb_friction", "viscous_friction", "return_pressure", "deadband",
     "bulk_modulus_slope", "air_fraction", "spool_slew", "hysteresis", "static_friction",
     "endstop_stiffness", "endstop_damping", "cushion_length", "relief_conductance", "check_conductance",
+    "counterbalance_a", "counterbalance_b",
 })  # fmt: skip
 BELOW = {"air_fraction": 0.5, "deadband": 1.0}
 
@@ -106,6 +109,8 @@ def unfit_figures(actuation: Actuation) -> list[Unfit]:
     found += [*_impossible(actuation, "parameters"), *_impossible(actuation, "nominal")]
     found = found or [Unfit(each.problem, each.fix) for each in doubtful_figures(actuation) if each.refused]
     if not found:
+        if p.get("counterbalance_a") and p.get("counterbalance_b"):
+            found.append(Unfit(f"{of} has a counterbalance valve at either port", "give that of the loaded port alone"))
         for small, large in (("rod", "bore"), ("return_pressure", "supply_pressure")):
             if large in p and not p.get(small, 0.0) < p[large]:
                 text = f"{of} has {small} {p[small]:g}, not below its {large} {p[large]:g}"

@@ -103,6 +103,11 @@ CYLINDER_RULES = (
     Rule("relief_pressure", 5e5, 2e8, "Pa"),
     Rule("relief_conductance", 1e-4, 1e4, "m3/(s Pa)", lambda p: 1e5 / p["rated_flow"], ("rated_flow",), _OPENS),
     Rule("check_conductance", 1e-4, 1e4, "m3/(s Pa)", lambda p: 1e5 / p["rated_flow"], ("rated_flow",), _OPENS),
+    *(Rule(f"counterbalance_{port}", 2e6, 1e8, "Pa") for port in ("a", "b")),
+    Rule("pilot_ratio", 0.5, 20.0, "", says="where {1} are usual", refuses=False),
+    Rule("counterbalance_flow", 0.05, 50.0, "m3/s", lambda p: 1.0 / p["rated_flow"], ("rated_flow",), _OF_FLOW),
+    Rule("counterbalance_drop", 5e4, 2e7, "Pa"),
+    Rule("counterbalance_range", 1e5, 2e7, "Pa"),
     Rule("initial_pressure", 1e3, 1e8, "Pa"),
     Rule("substep", 1e-6, 0.01, "s"),
 )  # fmt: skip

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from skillframe.fmu import Float
+from skillframe_hydraulics.counterbalance import conductances, narrowing
 from skillframe_hydraulics.symbolic_or_numeric import (
     absolute,
     clip,
@@ -68,6 +69,9 @@ def derive(values: dict[str, Any]) -> SimpleNamespace:
     p.cushion = p.cushion_flow / np.sqrt(p.rated_pressure_drop)
     p.omega = 2 * math.pi * p.spool_frequency
     p.stiffness = p.coulomb_friction / p.presliding_length
+    p.counterbalance_edge = p.counterbalance_flow / np.sqrt(p.counterbalance_drop)
+    p.holds_a, p.holds_b = (np.where(x > 0, 1.0, 0.0) for x in (p.counterbalance_a, p.counterbalance_b))
+    p.has_counterbalance = bool(np.any(p.holds_a + p.holds_b > 0))
     p.has_air, p.has_cushion = bool(np.any(p.air_fraction > 0)), bool(np.any(p.cushion_length > 0))
     p.has_stribeck = bool(np.any(p.static_friction > p.coulomb_friction))
     return p
@@ -122,14 +126,22 @@ def valve_flows(p: SimpleNamespace, spool: Float, pa: Float, pb: Float, ps: Floa
     extend, retract = maximum(u, 0.0), maximum(-u, 0.0)
     drop_a, drop_b, tr = pa - p.return_pressure, pb - p.return_pressure, p.laminar_pressure
     open_a, open_b = p.edge_pa * extend, p.edge_pb * retract
+    check_a = check_b = p.feed_check
+    if p.has_counterbalance:  # each has a check valve
+        check_a, check_b = maximum(check_a, p.holds_a), maximum(check_b, p.holds_b)
     open_a, open_b = (
-        opened * where(p.feed_check * (pressure - ps) > 0.0, 0.0, 1.0)
-        for opened, pressure in ((open_a, pa), (open_b, pb))
+        opened * where(check * (pressure - ps) > 0.0, 0.0, 1.0)
+        for opened, check, pressure in ((open_a, check_a, pa), (open_b, check_b, pb))
     )
     into_a, into_b = open_a * edge_flow(ps - pa, tr), open_b * edge_flow(ps - pb, tr)
     slope = open_a * edge_slope(ps - pa, tr) + open_b * edge_slope(ps - pb, tr)
-    out_a = _throttled(p.edge_at * retract, position, drop_a, p) * edge_flow(drop_a, tr)
-    out_b = _throttled(p.edge_bt * extend, p.stroke - position, drop_b, p) * edge_flow(drop_b, tr)
+    wide_a = _throttled(p.edge_at * retract, position, drop_a, p)
+    wide_b = _throttled(p.edge_bt * extend, p.stroke - position, drop_b, p)
+    if p.has_counterbalance:
+        held_a, held_b = conductances(p, pa, pb)
+        wide_a = wide_a * where(drop_a > 0.0, narrowing(wide_a, held_a), 1.0)
+        wide_b = wide_b * where(drop_b > 0.0, narrowing(wide_b, held_b), 1.0)
+    out_a, out_b = wide_a * edge_flow(drop_a, tr), wide_b * edge_flow(drop_b, tr)
     return Flows(into_a - out_a, into_b - out_b, into_a + into_b, slope)
 
 
@@ -143,6 +155,17 @@ def port_flow(p: SimpleNamespace, pressure: Float) -> Float:
 def burst_flow(p: SimpleNamespace, area: Float | float, pressure: Float) -> Float:
     """Eq. 11: flow into a chamber through a hole in its hose, negative above ambient pressure."""
     result: Float = -(area * HOLE) * edge_flow(pressure, p.laminar_pressure)
+    return result
+
+
+def held_burst_flow(p: SimpleNamespace, area: Float | float, pressure: Float, valve: Float, flow: Float) -> Float:
+    """Eq. 13: flow into a chamber through a hole in the hose before its counterbalance valve, of conductance `valve`.
+
+    The spool's `flow` goes out of the hole first. Of the chamber's oil only what the valve passes is lost.
+    """
+    hole = -burst_flow(p, area, pressure)
+    through = hole * narrowing(area * HOLE, valve)
+    result: Float = -where(pressure > 0.0, clip(maximum(flow, 0.0), through, hole), hole)
     return result
 
 
@@ -198,8 +221,13 @@ def pressure_rates(p: SimpleNamespace, y: Float, motion: PistonMotion) -> Float:
     pa, pb = y[2], y[3]
     flows = valve_flows(p, y[0], pa, pb, p.supply_pressure - motion.supply_drop, motion.position)
     leak = p.leakage * (pa - pb)
-    net_a = flows.a + port_flow(p, pa) - p.area_a * motion.velocity - leak + burst_flow(p, motion.burst_a, pa)
-    net_b = flows.b + port_flow(p, pb) + p.area_b * motion.velocity + leak + burst_flow(p, motion.burst_b, pb)
+    burst_a, burst_b = burst_flow(p, motion.burst_a, pa), burst_flow(p, motion.burst_b, pb)
+    if p.has_counterbalance:
+        held_a, held_b = conductances(p, pa, pb)
+        burst_a = held_burst_flow(p, motion.burst_a, pa, held_a, flows.a)
+        burst_b = held_burst_flow(p, motion.burst_b, pb, held_b, flows.b)
+    net_a = flows.a + port_flow(p, pa) - p.area_a * motion.velocity - leak + burst_a
+    net_b = flows.b + port_flow(p, pb) + p.area_b * motion.velocity + leak + burst_b
     volume_a, volume_b = volumes(p, motion.position)
     rate_a = bulk_modulus(pa, p) / volume_a * net_a * boiling(pa, net_a)
     rate_b = bulk_modulus(pb, p) / volume_b * net_b * boiling(pb, net_b)

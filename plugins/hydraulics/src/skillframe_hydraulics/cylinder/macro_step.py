@@ -123,6 +123,10 @@ def _count(p: SimpleNamespace, y: Vector, motion: eq.PistonMotion, rates: Vector
     slope = slope + where(minimum(pa - soon_a, pb - soon_b) < low, p.check_conductance, 0.0)
     slope = slope + where(maximum(pa + soon_a, pb + soon_b) > p.relief_pressure, p.relief_conductance, 0.0)
     slope = slope + eq.HOLE * maximum(motion.burst_a, motion.burst_b) / sqrt(p.laminar_pressure)
+    if p.has_counterbalance:  # that opens with either pressure
+        steep = p.counterbalance_edge / p.counterbalance_range * (1.0 + p.pilot_ratio)
+        held = maximum(p.holds_a, p.holds_b) * steep * sqrt(maximum(maximum(pa, pb), p.laminar_pressure))
+        slope = slope + where(wide + motion.burst_a + motion.burst_b > 0.0, held, 0.0)
     volume_a, volume_b = eq.volumes(p, motion.position)
     drawn = p.area_a * absolute(motion.velocity) + p.leakage * absolute(pa - pb)  # m3/s that may make a chamber boil
     slope = slope + where(minimum(pa - soon_a, pb - soon_b) < eq.VAPOUR, drawn / eq.BOILING, 0.0)

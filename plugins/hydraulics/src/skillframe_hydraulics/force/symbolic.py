@@ -25,7 +25,7 @@ from skillframe_hydraulics.force.momentum import (
 )
 from skillframe_hydraulics.law.generated import dense_function, matrix_symbol
 from skillframe_hydraulics.law.symbolic_chain import Expression
-from skillframe_hydraulics.law.vdc_actuator import Cylinders
+from skillframe_hydraulics.law.vdc_actuator import CYLINDER, Cylinders
 
 _KALMAN = ("force", "slope", "once", "twice")
 
@@ -73,7 +73,7 @@ def look_function(c: Cylinders, s: ForceSettings, n: int, components: int, dt: f
     before = m["rate"]
     rate = before + float(-np.expm1(-2.0 * np.pi * s.rate_corner * dt)) * (v["piston_rate"] - before)
     shape = ca.tanh(rate / s.sliding_speed)
-    c = Cylinders(**{name: ca.DM(getattr(c, name)) for name in Cylinders.__dataclass_fields__})
+    c = Cylinders(**{name: ca.DM(getattr(c, name)) for name in CYLINDER})
     push = sliding_push(c, (v["p_a"], v["p_b"]), shape, v["piston_rate"])
     momentum, known = v["mass"] @ v["rate"], v["arms"].T @ push + v["drift"] - v["gravity"]
     left = unaccounted(momentum, ca.if_else(fresh > 0, momentum, m["momentum"]), known, dt)

@@ -144,6 +144,8 @@ class ValveIdentification:
             ratio = into / np.maximum(out, 1e-9) * (wide_out / wide_in)
             fits.append((out / (c.edge * wide_out * np.sqrt(drop)), filled + ratio * ratio * drop))
         (opening, supply), (wider, higher) = fits
+        if valves := c.counterbalance:  # what drains through one is no measure of the spool
+            drained = drained * (1.0 - np.stack([valves.holds_b, valves.holds_a])[:, None])
         clear = (drained > s.drop) & (np.abs(squeezed).max(axis=0) < s.squeezed * np.abs(v))
 
         told = self._line

@@ -1,8 +1,8 @@
 r"""The controller of `hydraulic` and its model's terms for one trial, as casadi functions.
 
 With kinetic energy T and potential energy U, M_z = d^2T/dzd^2, C_z^T zd = dT/dz and g_z = dU/dz (Lagrange). Inertial
-parameters, cylinders, gains, bounds and sample time are inputs; geometry is constant. Arrays are row by row, as in
-numpy.
+parameters, cylinders, gains, bounds and sample time are inputs; geometry and counterbalance valves are constant. Arrays
+are row by row, as in numpy.
 """
 
 from __future__ import annotations
@@ -16,9 +16,11 @@ import pinocchio as pin
 from skillframe.frames import Float
 from skillframe.robot import ClosedChain, published_inertia
 from skillframe.signals import rate_after
+from skillframe_hydraulics.counterbalance import counterbalances
 from skillframe_hydraulics.law.generated import dense_function, matrix_symbol
 from skillframe_hydraulics.law.symbolic_chain import Expression, SymbolicChain, closing_function, constant
 from skillframe_hydraulics.law.vdc_actuator import (
+    CYLINDER,
     ContactFriction,
     CylinderGains,
     Cylinders,
@@ -34,7 +36,6 @@ from skillframe_hydraulics.law.vdc_body import PARAMETERS, kinetic_energy, neede
 from skillframe_hydraulics.law.vdc_reference import required_motion, swung_by
 from skillframe_hydraulics.symbolic_or_numeric import clip
 
-CYLINDER = tuple(Cylinders.__dataclass_fields__)
 _KEPT: dict[tuple[Any, ...], tuple[ca.Function, ca.Function, ca.Function]] = {}
 SCALARS = ("body", "adaptation", "coulomb", "viscous", "joint", "corner", "touch", "sliding", "dt", "fresh")
 
@@ -44,7 +45,7 @@ def functions(chain: ClosedChain, axes: Float) -> tuple[ca.Function, ca.Function
     chosen = (chain.driven, chain.dependent, chain.free, chain.rows, chain.coupling, chain.offsets, axes)
     key = (
         chain.model.saveToString(), chain.robot.tool_frames[0], chain.steered, *(each.tobytes() for each in chosen),
-        chain.loops,
+        chain.loops, repr(counterbalances(chain.robot.spec.actuation)),
         published_inertia(chain.robot.spec).com if chain.robot.spec.payload else None,
     )  # fmt: skip
     if key not in _KEPT:
@@ -117,7 +118,8 @@ def law_function(chain: ClosedChain, axes: Float) -> ca.Function:
     rub_bounds = [matrix_symbol(f"friction_{name}", 2, k) for name in ("lower", "upper")]
     table, cylinder = matrix_symbol("cylinder", len(CYLINDER), k)
     k_x, k_f, deadband, supply = (ca.SX.sym(name, k) for name in ("k_x", "k_f", "deadband", "supply"))
-    c = Cylinders(**{name: cylinder[i, :].T for i, name in enumerate(CYLINDER)})
+    valves = counterbalances(chain.robot.spec.actuation)
+    c = Cylinders(**{name: cylinder[i, :].T for i, name in enumerate(CYLINDER)}, counterbalance=valves)
 
     tip = constant(axes) @ s.frame(chain.robot.tool_frames[0]).origin
     hung = tip if not swung_by(chain) else _hung(s, rows, tip)

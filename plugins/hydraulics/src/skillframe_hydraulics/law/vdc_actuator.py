@@ -14,6 +14,9 @@ k_x) + (theta_f - theta_f^)^2 / (2 rho_f) is the accompanying function of a cyli
 `laminar_pressure`, where the published inverse is singular. The last line compensates the overlap b, smoothed over w =
 0.2 % of the travel against chatter.
 
+Where a counterbalance valve stands in series with an edge to the return line, c_at or c_bt u_e is that of both, by
+`counterbalance`, and u_e is found by Newton's rule: the flow is concave in u_e, so it is approached from below.
+
 Without force feedback (c = 0) friction has a bristle state z (Zhu and Piedboeuf, 2005). With feedback it is a flat
 function of the required velocity: a bristle would answer the estimated force too late and a steep tanh too strongly,
 and the machine would oscillate. f_0 is small, so that the two do not alternate while a tool lands. Formulas take arrays
@@ -31,9 +34,21 @@ import numpy as np
 from skillframe.frames import Float
 from skillframe.robot import Actuation
 from skillframe_hydraulics.checks.figures import EDGES, NEEDED, SHAPE, areas, is_motor, require_known
-from skillframe_hydraulics.symbolic_or_numeric import absolute, exp, maximum, sign, sqrt, square_sum, tanh, where
+from skillframe_hydraulics.counterbalance import Counterbalance, conductances, counterbalances, narrowing
+from skillframe_hydraulics.symbolic_or_numeric import (
+    absolute,
+    copysign,
+    exp,
+    maximum,
+    sign,
+    sqrt,
+    square_sum,
+    tanh,
+    where,
+)
 
 ACROSS = 2e-3  # w, share of the valve's travel
+ROUNDS = 5  # of Newton's rule, after which 1e-6 of the flow is missing at most
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -48,6 +63,7 @@ class Cylinders:
         sliding: 1, or 0 of a motor. Its areas are volumes per radian [m^3], its chambers keep their volumes, its stroke
             is 0; what is in m, m/s and N of a cylinder is in rad, rad/s and Nm.
         presliding_length: z_ss [m].
+        counterbalance: their counterbalance valves, None if there are none.
     """
 
     area_a: Float
@@ -71,6 +87,11 @@ class Cylinders:
     edge_at: Float
     edge_bt: Float
     feed_check: Float
+    counterbalance: Counterbalance | None = None
+
+
+CYLINDER = tuple(name for name in Cylinders.__dataclass_fields__ if name != "counterbalance")
+"""Fields that are arrays (n,)."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -107,6 +128,7 @@ def cylinders(actuation: Sequence[Actuation], where: object = "robot.toml") -> C
         **{name: p[name] for name in (*kept, *pressures)},
         **{name: np.array([row.get(name, 1.0) for row in rows], dtype=float) for name in EDGES},
         feed_check=np.array([row.get("feed_check", 0.0) for row in rows], dtype=float),
+        counterbalance=counterbalances(actuation),
     )  # fmt: skip
 
 
@@ -163,9 +185,19 @@ def inverse_valve(c: Any, demand: Any, x: Any, pressures: tuple[Any, ...], suppl
     """Unlimited opening u_e (..., n) of the edges for the flow demand, at the supply p_S or the nominal one."""
     (p_a, p_b), high = pressures, c.supply_pressure if supply is None else supply
     a, b = (1.0 / length for length in chamber_lengths(c, x))
-    extend = c.edge_pa * sqrt(_drop(c, high - p_a)) * a + c.edge_bt * sqrt(_drop(c, p_b - c.return_pressure)) * b
-    retract = c.edge_pb * sqrt(_drop(c, high - p_b)) * b + c.edge_at * sqrt(_drop(c, p_a - c.return_pressure)) * a
-    return demand / (c.edge * where(demand > 0.0, extend, retract))
+    into_a, out_b = c.edge_pa * sqrt(_drop(c, high - p_a)) * a, c.edge_bt * sqrt(_drop(c, p_b - c.return_pressure)) * b
+    into_b, out_a = c.edge_pb * sqrt(_drop(c, high - p_b)) * b, c.edge_at * sqrt(_drop(c, p_a - c.return_pressure)) * a
+    opened = demand / (c.edge * where(demand > 0.0, into_a + out_b, into_b + out_a))
+    if c.counterbalance is None:
+        return opened
+    held_a, held_b = conductances(c.counterbalance, p_a, p_b)
+    into, out = c.edge * where(demand > 0.0, into_a, into_b), c.edge * where(demand > 0.0, out_b, out_a)
+    wide, held = c.edge * where(demand > 0.0, c.edge_bt, c.edge_at), where(demand > 0.0, held_b, held_a)
+    u = absolute(opened)
+    for _ in range(ROUNDS):
+        bent = narrowing(wide * u, held)
+        u = u + (absolute(demand) - (into + out * bent) * u) / (into + out * bent * bent * bent)
+    return copysign(u, demand)
 
 
 def across_deadband(deadband: Any, opening: Any) -> Any:
