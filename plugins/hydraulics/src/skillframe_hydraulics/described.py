@@ -2,7 +2,8 @@
 
 A cylinder from pin to pin is a `[[strut]]` and an `[[actuation]]` of its rod, one on a joint an `[[actuation]]`. Keys
 that are neither geometry nor of `Actuation` are figures, in `parameters` of the cylinder that ships, or in `nominal` of
-another FMU. A motor's displacement D [m3] is that of a revolution: at its joint D gear / 2 pi [m3/rad].
+another FMU. A motor's displacement D [m3] is that of a revolution: at its joint D gear / 2 pi [m3/rad]. A
+counterbalance valve is a table of its own, `counterbalance`.
 """
 
 from __future__ import annotations
@@ -22,6 +23,10 @@ DRAWN = ("closed", "stroke", "mass")
 OF_ACTUATION = frozenset(each.name for each in fields(Actuation)) - {"joint"}
 TURNING = {"coulomb_friction": "N m", "static_friction": "N m", "viscous_friction": "N m s/rad"}
 """Units of a motor's figures where a cylinder's are of forces. Defaults for cylinders leave them out for motors."""
+HOLDING = {"setting": "Pa", "pilot_ratio": "", "flow": "m3/s", "drop": "Pa", "range": "Pa"}
+"""Figures of a counterbalance valve with their units."""
+PORTS = {"bottom": "a", "rod": "b", "a": "a", "b": "b"}
+_WRITE = 'write counterbalance = { port = "bottom", setting = "210 bar", pilot_ratio = 4, flow = "40 l/min at 10 bar" }'
 
 
 def write_out(values: dict[str, Any], path: Path) -> dict[str, Any]:
@@ -41,7 +46,7 @@ def write_out(values: dict[str, Any], path: Path) -> dict[str, Any]:
         if kind not in SHORT[:2]:
             raise InputError(f"{path}: defaults", str(UnknownName("key", kind, SHORT[:2])))
     common = defaults.get("cylinder", {})
-    apart = {**TURNING, **dict.fromkeys((*SHAPE, *DRAWN))}
+    apart = {**TURNING, **dict.fromkeys((*SHAPE, *DRAWN, "counterbalance"))}
     of_motors = {**{k: v for k, v in common.items() if k not in apart}, **defaults.get("motor", {})}
     struts, drives = _listed(values, "strut", path), _listed(values, "actuation", path)
     for own in _listed(values, "cylinder", path):
@@ -69,7 +74,7 @@ def _cylinder(table: dict[str, Any], path: Path) -> Iterator[tuple[str, dict[str
     if joint is not None:
         if pinned:
             raise InputError(where, f"is on the joint {joint} and between pins", "give joint, or from and to")
-        yield str(joint), {}, _actuation(table, str(joint))
+        yield str(joint), {}, _actuation(table, str(joint), where)
         return
     if not isinstance(name, str) or not name:
         raise InputError(where, "has no name", 'write for example name = "boom"')
@@ -88,7 +93,7 @@ def _cylinder(table: dict[str, Any], path: Path) -> Iterator[tuple[str, dict[str
     strut = {"base": table.pop("from"), "eye": table.pop("to"), **{key: table[key] for key in DRAWN}}
     del table["closed"], table["mass"]
     for side, way in (("", 0.0),) if count == 1 else (("_left", beside), ("_right", -beside)):
-        yield f"{name}{side}", {**strut, "beside": way}, _actuation(dict(table), f"{name}{side}_rod")
+        yield f"{name}{side}", {**strut, "beside": way}, _actuation(dict(table), f"{name}{side}_rod", where)
 
 
 def _motor(table: dict[str, Any], path: Path) -> dict[str, Any]:
@@ -104,10 +109,10 @@ def _motor(table: dict[str, Any], path: Path) -> dict[str, Any]:
             raise InputError(f"{where}.{key}", f"is {value!r:.60}", "give a positive number")
     table["displacement"] = of["displacement"] * of["gear"] / (2.0 * math.pi)
     table |= {key: si(table[key], unit, f"{where}.{key}") for key, unit in TURNING.items() if key in table}
-    return _actuation(table, joint)
+    return _actuation(table, joint, where)
 
 
-def _actuation(table: dict[str, Any], joint: str) -> dict[str, Any]:
+def _actuation(table: dict[str, Any], joint: str, where: str) -> dict[str, Any]:
     """The table of an `[[actuation]]`, from its own keys and figures."""
     from skillframe_hydraulics.checks.figures import CYLINDER
 
@@ -116,6 +121,32 @@ def _actuation(table: dict[str, Any], joint: str) -> dict[str, Any]:
     if "dead_volume" in figures:  # of either chamber
         both = figures.pop("dead_volume")
         figures = {"dead_volume_a": both, "dead_volume_b": both, **figures}
+    if "counterbalance" in figures:
+        figures = {**_counterbalance(figures.pop("counterbalance"), f"{where}.counterbalance"), **figures}
     fmu = own.setdefault("fmu", CYLINDER)
     kept = "parameters" if fmu == CYLINDER else "nominal"
     return {**own, "joint": joint, kept: {**figures, **own.get(kept, {})}}
+
+
+def _counterbalance(table: object, where: str) -> dict[str, float]:
+    """Figures of a counterbalance valve, from those of its data sheet."""
+    if not isinstance(table, Mapping):
+        raise InputError(where, f"is {table!r:.60}", _WRITE)
+    for key in table:
+        if key == "drop" or key not in (*HOLDING, "port"):
+            raise InputError(where, str(UnknownName("key", key, ("port", *(k for k in HOLDING if k != "drop")))))
+    if missing := [key for key in ("port", "setting", "pilot_ratio", "flow") if key not in table]:
+        raise InputError(where, f"has no {', '.join(missing)}", _WRITE)
+    if table["port"] not in PORTS:
+        raise InputError(f"{where}.port", str(UnknownName("port", str(table["port"]), PORTS)))
+    flow, _, drop = str(table["flow"]).partition(" at ")
+    if not drop:
+        text = f"is {table['flow']!r:.60}, without the pressure drop at which the open valve passes it"
+        raise InputError(f"{where}.flow", text, 'write for example "40 l/min at 10 bar"')
+    given = {**table, "flow": flow, "drop": drop}
+    found = {key: si(given[key], unit, f"{where}.{key}") for key, unit in HOLDING.items() if key in given}
+    for key, value in found.items():
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0.0 < value < math.inf:
+            raise InputError(f"{where}.{key}", f"is {value!r:.60}", "give a positive number, with its unit as text")
+    names = {"setting": f"counterbalance_{PORTS[table['port']]}", "pilot_ratio": "pilot_ratio"}
+    return {names.get(key, f"counterbalance_{key}"): value for key, value in found.items()}

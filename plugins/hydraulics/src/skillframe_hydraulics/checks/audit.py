@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from skillframe.errors import InputError, SkillframeError
 from skillframe.extend import unmapped_warnings
 from skillframe.robot import ClosedChain, Limits, Problem, RobotModel, cannot_run, warning
-from skillframe_hydraulics.checks.feasibility import problems, short_struts, strained_actuators
+from skillframe_hydraulics.checks.feasibility import low_settings, problems, short_struts, strained_actuators
 from skillframe_hydraulics.checks.figures import (
     CYLINDER,
     Unfit,
@@ -61,10 +61,17 @@ def machine_warnings(robot: RobotModel) -> Iterator[Problem]:
     try:
         chain = ClosedChain(robot)
         z = chain.minimal(chain.home)
-        unfit, small, strained, far = [] if slips else problems(chain, z), list[Unfit](), list[str](), ""
+        unfit, small, strained, low, far = (
+            [] if slips else problems(chain, z),
+            list[Unfit](),
+            list[str](),
+            list[str](),
+            "",
+        )
         if not unfit:
             small = list(unfit_pumps(chain, task := tool_task(chain)))
             strained, far = list(strained_actuators(chain, z)), far_fixture(chain, task)
+            low = list(low_settings(chain, z))
     except SkillframeError as error:
         text, fix = (error.problem, error.fix) if isinstance(error, InputError) else (str(error), "correct robot.toml")
         yield cannot_run(f"{text}: it can be checked and shown, not run", fix)
@@ -78,6 +85,8 @@ def machine_warnings(robot: RobotModel) -> Iterator[Problem]:
         yield warning("short_reach", text, "correct its pins, closed or stroke, or the joint's limits")
     for text in strained:
         yield warning("little_force_left", text, "a larger bore, more supply_pressure, less load, or another [home]")
+    for text in low:
+        yield warning("low_setting", text, "correct setting or port under counterbalance of its [[cylinder]]")
     if far:
         yield warning("far_fixture", far, "write another fixture under [workspace], within the working range")
     for text in unfit:

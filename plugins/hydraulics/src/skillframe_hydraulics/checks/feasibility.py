@@ -20,6 +20,7 @@ from skillframe.frames import Float, norm
 from skillframe.robot import MISFIT, Actuation, ClosedChain, OutOfReach
 from skillframe_hydraulics.checks.figures import CYLINDER, is_motor, needed, relief, require_known
 from skillframe_hydraulics.checks.figures import areas as chamber_areas
+from skillframe_hydraulics.checks.load_holding import low_setting, opens_by_itself
 
 LEAST_ARM = 0.1  # m, or a sixth of the stroke: a force error of 1 kN has less than a third of its effect at mid stroke
 HELD = 0.75  # of an actuator's force; sound machines hold their load with 0.6, and one with 0.79 failed in the swing
@@ -95,6 +96,7 @@ def problems(chain: ClosedChain, z: Float) -> list[str]:
         for actuation, force in zip(spec.actuation, state.holding_force(areas(spec.actuation) ** 2), strict=False):
             if actuation.fmu == CYLINDER or all(name in actuation.known for name in needed(actuation, _NEEDED)):
                 found += _overload(actuation, force, spec.folder / "robot.toml")
+                found += opens_by_itself(actuation, float(force))
     return found
 
 
@@ -109,6 +111,18 @@ def strained_actuators(chain: ClosedChain, z: Float) -> Iterator[str]:
         if abs(force) > HELD * most:
             share = f"{100.0 * abs(force) / most:.0f} % of its force to hold its load"
             yield f"at home {one.joint} needs {share}: a run may end in the swing, for want of force to move it"
+
+
+def low_settings(chain: ClosedChain, z: Float) -> Iterator[str]:
+    """Sentences on counterbalance valves that are set low for the loads at coordinates z (n,)."""
+    spec, state = chain.robot.spec, chain.at(z, np.zeros(len(z)))
+    for one, force in zip(spec.actuation, state.holding_force(areas(spec.actuation) ** 2), strict=True):
+        if (
+            text := ""
+            if any(name not in one.known for name in needed(one, _NEEDED))
+            else low_setting(one, float(force))
+        ):
+            yield text
 
 
 def require_feasible(chain: ClosedChain, z: Float) -> None:
