@@ -138,12 +138,19 @@ def test_in_steady_lowering_the_pilot_has_what_the_setting_lacks_over_the_pilot_
     assert p_b == pytest.approx((setting + opened * RANGE - p_a) / ratio, abs=0.01 * RANGE / ratio)
 
 
-def test_a_high_pilot_ratio_makes_a_load_swing_that_a_low_one_lowers_smoothly():
-    """As on real machines: the pilot answers the speed by an integral, and the load's own pressure less."""
-    light = HELD | {"viscous_friction": 2e4, "counterbalance_a": 200e5}
-    smooth, swinging = (ridden(light | {"pilot_ratio": r}, lambda t: -0.1, 1.6, place=0.5) for r in (1.0, 4.0))
-    assert np.std(smooth[-800:, 1]) < 0.02 * -smooth[-800:, 1].mean()
-    assert np.std(swinging[-800:, 1]) > 0.5 * -swinging[-800:, 1].mean()
+@pytest.mark.slow
+@pytest.mark.parametrize(("share", "swings"), [(0.5, False), (2.0, True)])
+def test_a_load_swings_up_while_it_sinks_if_the_pilot_ratio_is_above_that_of_the_chambers_lengths(share, swings):
+    """As on real machines. Without friction, where the valve's flow grows by G with the load's pressure,
+
+    m V_a V_b s^3 + m V_b B G s^2 + B (A_b^2 V_a + A_a^2 V_b) s + B^2 G A_b (A_b + R A_a) = 0, stable by Routh's
+    criterion for R < (V_b / A_b) / (V_a / A_a), here 1.06 m over 1.00 m.
+    """
+    most = (DEAD / AREA_B + STROKE - 0.4) / (DEAD / AREA_A + 0.4)
+    free = HELD | {"viscous_friction": 0.0, "counterbalance_a": 200e5, "pilot_ratio": share * most}
+    speed = ridden(free, lambda t: -0.04, 3.0)[-round(0.4 / H) :, 1]
+    assert (np.std(speed) > np.abs(speed.mean())) == swings
+    assert swings or np.std(speed) < 0.2 * -speed.mean()
 
 
 def test_a_held_load_stays_and_sinks_only_by_the_pistons_leak():
@@ -223,7 +230,7 @@ def test_the_law_opens_the_spool_so_far_that_edge_and_valve_pass_what_is_asked(s
     out_a, out_b = wide_a * narrowing(wide_a, held_a), wide_b * narrowing(wide_b, held_b)
     extend = c.edge * u * np.sqrt(c.supply_pressure - p_a) / a + out_b * np.sqrt(p_b - c.return_pressure) / b
     retract = c.edge * u * np.sqrt(c.supply_pressure - p_b) / b - out_a * np.sqrt(p_a - c.return_pressure) / a
-    np.testing.assert_allclose(np.where(demand > 0.0, extend, retract), demand, rtol=1e-5)
+    np.testing.assert_allclose(np.where(demand > 0.0, extend, retract), demand, rtol=2e-5)
 
 
 def flows_of_lowering(valves):
