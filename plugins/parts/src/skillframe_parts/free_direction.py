@@ -12,7 +12,7 @@ from skillframe.frames import Float
 from skillframe_parts.fit import TOUCH, PartsFit, thickness
 
 RAISED_M, STEP_M = 3e-4, 5e-4
-"""Height over the end in which it slides, off the bottom, and distance after which it is looked at again."""
+"""Height over the end in which it slides, off the bottom, and distance between the checked places."""
 DIRECTIONS = np.radians(np.arange(0.0, 180.0, 10.0))
 
 
