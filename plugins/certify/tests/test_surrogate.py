@@ -210,3 +210,17 @@ def test_labels_that_are_all_alike_are_found_to_their_end(count):
 def test_trials_at_one_place_that_end_both_ways_give_their_rate():
     there = np.zeros((40, 2))
     assert Surrogate(there, np.arange(40) % 4 > 0).success(there[:1])[0] == pytest.approx(0.75, abs=0.1)
+
+
+def test_no_covariance_is_judged_twice(monkeypatch):
+    """The ascents from both starts come back to their neighbours, and meet each other's."""
+    judged = []
+
+    def seen(points, labels, lengths, amplitude):
+        judged.append((*lengths, amplitude))
+        return real(points, labels, lengths, amplitude)
+
+    real = surrogate._evidence
+    monkeypatch.setattr(surrogate, "_evidence", seen)
+    Surrogate(SOBOL[:64], np.sum(SOBOL[:64] ** 2, axis=1) < 0.6)
+    assert len(judged) == len(set(judged)) > 10

@@ -103,6 +103,17 @@ def test_debug_is_understood_anywhere_on_the_line(monkeypatch):
     assert seen == [(["plugins"], True)]
 
 
+@pytest.mark.parametrize(("given", "threads"), [(None, "1"), ("3", "3")])
+def test_a_command_has_one_thread_of_openblas_unless_the_user_sets_more(monkeypatch, given, threads):
+    monkeypatch.setenv("OPENBLAS_NUM_THREADS", given or "")
+    if given is None:
+        monkeypatch.delenv("OPENBLAS_NUM_THREADS")
+    monkeypatch.setattr(main, "run", lambda arguments, debug: 0)
+    with pytest.raises(SystemExit):
+        main.main(["plugins"])
+    assert os.environ["OPENBLAS_NUM_THREADS"] == threads
+
+
 @pytest.mark.parametrize("words", [["worlds"], ["--help"], ["run", "--help"], ["--version"]])
 @pytest.mark.slow
 def test_a_reader_that_leaves_early_is_no_error(words):

@@ -23,11 +23,12 @@ labels are certain, the mode lies far below the mean.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
+from scipy.linalg import cholesky, solve_triangular
 from scipy.special import log_ndtr, ndtr
 
 from skillframe.frames import Float
@@ -67,10 +68,7 @@ class Surrogate:
         count = len(points)
         evenly = np.unique(np.linspace(0, count - 1, MOST_ROWS).round().astype(int))
         samples = [evenly] if count <= MOST_ROWS else [np.arange(MOST_ROWS), evenly]
-        found = [
-            max((_climbed(points[s], labels[s], *start) for start in ((1.0, 16.0), (0.3, 4.0))), key=lambda one: one[0])
-            for s in samples
-        ]
+        found = [_climbed(points[s], labels[s]) for s in samples]
         if len(found) > 1:
             found.sort(key=lambda one: _evidence(points, labels, *one[1:]))
         _, lengths, amplitude = found[-1]
@@ -158,29 +156,34 @@ def covariance(first: Float, second: Float, lengths: Float) -> Float:
     return result
 
 
-def _climbed(points: Float, labels: Float, length: float, amplitude: float) -> tuple[float, Float, float]:
-    """A local maximum of the evidence, its lengths (d,) and its amplitude, by coordinate ascent."""
-    dimension = points.shape[1]
-    ladders = [LENGTHS] * dimension + [AMPLITUDES]
-    places = [_nearest(LENGTHS, length)] * dimension + [_nearest(AMPLITUDES, amplitude)]
+def _climbed(points: Float, labels: Float) -> tuple[float, Float, float]:
+    """The evidence's larger local maximum from two starts, its lengths (d,) and amplitude, by coordinate ascent."""
+    ladders = [LENGTHS] * points.shape[1] + [AMPLITUDES]
 
-    def at(rungs: list[int]) -> tuple[Float, float]:
+    def at(rungs: tuple[int, ...]) -> tuple[Float, float]:
         return np.array([LENGTHS[i] for i in rungs[:-1]]), AMPLITUDES[rungs[-1]]
 
-    best = _evidence(points, labels, *at(places))
-    for _ in range(3):
-        before = best
-        for i, ladder in enumerate(ladders):
-            for step in (-1, 1):
-                while 0 <= places[i] + step < len(ladder):
-                    tried = [*places[:i], places[i] + step, *places[i + 1 :]]
-                    found = _evidence(points, labels, *at(tried))
-                    if found <= best:
-                        break
-                    best, places = found, tried
-        if best == before:
-            break
-    return best, *at(places)
+    @cache  # ascents come back to their neighbours, and meet each other's
+    def reached(rungs: tuple[int, ...]) -> float:
+        return _evidence(points, labels, *at(rungs))
+
+    found = []
+    for length, amplitude in ((1.0, 16.0), (0.3, 4.0)):
+        places = (*[_nearest(LENGTHS, length)] * points.shape[1], _nearest(AMPLITUDES, amplitude))
+        for _ in range(3):
+            before = places
+            for i, ladder in enumerate(ladders):
+                for step in (-1, 1):
+                    while 0 <= places[i] + step < len(ladder):
+                        tried = (*places[:i], places[i] + step, *places[i + 1 :])
+                        if reached(tried) <= reached(places):
+                            break
+                        places = tried
+            if places == before:
+                break
+        found.append(places)
+    best = max(found, key=reached)
+    return reached(best), *at(best)
 
 
 def _nearest(ladder: tuple[float, ...], value: float) -> int:
@@ -296,7 +299,9 @@ def _slope(hidden: Float, labels: Float) -> tuple[Float, Float]:
 
 def factor_of(gram: Float, root: Float) -> Float:
     """Lower Cholesky factor (n, n) of I + R K R, with the diagonal matrix R of `root` (n,)."""
-    return np.asarray(np.linalg.cholesky(np.eye(len(root)) + root[:, None] * gram * root))
+    matrix = root[:, None] * gram * root
+    matrix.flat[:: len(root) + 1] += 1.0
+    return np.asarray(cholesky(matrix.T, lower=True, overwrite_a=True, check_finite=False))  # .T: LAPACK's own order
 
 
 def solved(factor: Float, right: Float) -> Float:
