@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 from skillframe_drive.fake import FakeArm
-from skillframe_drive.link import RobotState
+from skillframe_drive.link import RobotState, Spring
 
-from skillframe.frames import Float
+from skillframe.frames import Float, pose_error, skew
 from skillframe.world.quantities import SensorSettings
 
 
@@ -63,3 +63,46 @@ class DirectLink:
 
     def close(self) -> None:
         self.log.append("close")
+
+
+class ImpedanceDirectLink(DirectLink):
+    """A robot that has the impedance controller itself, at the tip, and renders `share` of the stiffness.
+
+    Attributes:
+        late: periods by which the feed-forward is late.
+    """
+
+    def __init__(self, arm: FakeArm, share: float = 1.0, late: int = 0) -> None:
+        super().__init__(arm, "impedance", 0.002)
+        self.share, self._spring = share, None
+        self._feedforward = [np.zeros(6)] * (late + 1)
+
+    def read(self) -> RobotState:
+        for _ in range(2):
+            self.arm_.step(self._law())
+        self.time += self.period
+        return RobotState(self.time, self.arm_.position.copy(), self.arm_.velocity.copy(), self.arm_.wrench.copy())
+
+    def _law(self) -> Float:
+        """Torques (n,) above gravity."""
+        arm, spring = self.arm_, self._spring
+        if spring is None:
+            return arm.holding(arm.target[0], 1e4, 200.0)
+        jacobian = arm.jacobian.copy()
+        jacobian[:3] -= skew((arm.pose.rotation[0] @ arm.tip)[None])[0] @ jacobian[3:]
+        error = pose_error(spring.desired, arm.pose.at(arm.tip))[0]
+        twist = jacobian @ arm.velocity
+        wrench = self.share * spring.stiffness @ error - spring.damping @ twist + self._feedforward[0]
+        pull = -2.0 * arm.velocity
+        mobility = np.linalg.solve(arm.mass_matrix(), jacobian.T)
+        null = pull - jacobian.T @ np.linalg.solve(jacobian @ mobility, mobility.T @ pull)
+        return jacobian.T @ wrench + null
+
+    def send(self, command: Spring) -> None:
+        self.sent += 1
+        error = pose_error(command.desired, command.measured)[0]
+        rest = command.wrench - command.stiffness @ error + command.damping @ command.twist
+        self._spring, self._feedforward = command, [*self._feedforward[1:], rest]
+
+    def refused(self, command: Spring) -> str:
+        return ""

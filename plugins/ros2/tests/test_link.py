@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from nodes import HOST, JOINTS, Nodes
 from skillframe_drive.cell import Cell
-from skillframe_drive.identify import identify
+from skillframe_drive.impedance import identify_impedance
 from skillframe_drive.link import Spring
 from skillframe_drive.runs import load_task
 from skillframe_ros2 import dds, law, messages, topics
@@ -190,10 +190,11 @@ def test_a_run_that_ends_holds_the_arm_where_it_is_without_wrench(nodes, link):
     assert held.pose.position.z == pytest.approx(0.3) and push.wrench.force.z == 0.0
 
 
-def test_a_robot_that_takes_impedances_is_not_identified_joint_by_joint(nodes, link):
+def test_an_identification_at_another_centre_than_the_end_effector_s_ends_before_anything_is_published(nodes, link):
     task = load_task(Cell(robot="fr3", link="ros2", host=HOST, world="valley"))
-    with pytest.raises(SkillframeError, match="identify the robot through a link that takes torques"):
-        identify(task, link, print)
+    with pytest.raises(SkillframeError, match=r"the identification ended: the controller's frame tip is .* mm"):
+        identify_impedance(task, link, print, np.zeros(3))
+    assert not dds.taken(nodes.targets)
 
 
 @pytest.mark.slow

@@ -1,13 +1,17 @@
 """Skills through DDS against the stand-in for the controller, in lockstep."""
 
+import re
 import threading
 
 import numpy as np
 import pytest
 from nodes import HOST
 from rehearsal import cell, rehearse
+from skillframe_drive import identify as motions
+from skillframe_drive import impedance
 from skillframe_drive.cell import Cell
 from skillframe_drive.fake import FakeArm
+from skillframe_drive.identify import Motions
 from skillframe_drive.runs import load_task, run_once
 from skillframe_ros2.fake import FakeCrisp
 from skillframe_ros2.link import Ros2Link
@@ -102,3 +106,43 @@ def test_from_the_command_line_a_check_sends_nothing(tmp_path):
     ended = rehearse("ros2", ["check", str(cell(tmp_path, "fr3", "ros2"))])
     assert ended.code == 0 and ended.said.count("ok ") == 4 and "500 states a second" in ended.said
     assert "0 commands" in ended.fake
+
+
+class Weak(FakeCrisp):
+    """A controller that renders 0.7 of the stiffness that it is sent along the axes, without saying so."""
+
+    def change(self, values):
+        super().change(values)
+        stiffness, damping = self.gains
+        self.gains = stiffness * np.repeat([0.7, 1.0], 3), damping
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "share", "friction"), [(FakeCrisp, 1.0, 0.0), (Weak, 0.7, 0.3)])
+def test_planted_stiffness_and_friction_are_identified(monkeypatch, kind, share, friction):
+    monkeypatch.setattr("skillframe_ros2.link.SILENT_S", 5.0)  # in lockstep the clock stands while the machine is busy
+    for module in (motions, impedance):
+        monkeypatch.setattr(module, "MOTIONS", Motions(tilt_s=0.5, held_s=0.2))
+    sensors = SensorSettings(force_noise=0.3, torque_noise=0.02)
+    arm = FakeArm("fr3", "valley", {"start.offset_z": 0.15, "robot.joint_friction": friction}, 0, sensors)
+    fake, ends = kind(arm, HOST, lockstep=True), threading.Event()
+    serving = threading.Thread(target=fake.run, args=(ends.is_set,))
+    serving.start()
+    try:
+        link = Ros2Link(HOST)
+        try:
+            task = load_task(Cell(robot="fr3", link="ros2", host=HOST, world="valley"))
+            found = impedance.identify_impedance(task, link, print, arm.tip)
+        finally:
+            link.close()
+    finally:
+        ends.set()
+        serving.join()
+        fake.close()
+    along = [line for line in found.lines if line.text.startswith("along")]
+    stiffness = [float(re.findall(r"([\d.]+) N/m where", line.text)[0]) for line in along]
+    assert np.array(stiffness) / impedance.PROBES.stiffness[0] == pytest.approx([share] * 3, rel=0.04)
+    assert all(bool(line.problem) == (share != 1.0) for line in along)
+    assert found.vary["robot.joint_friction"][1] == pytest.approx(friction, abs=0.07)
+    late = next(float(each) for line in found.lines for each in re.findall(r"(\d+) ms late", line.text))
+    assert late <= 3.0  # of the way through DDS in lockstep, and of the controller's limit of the torques' rate

@@ -158,31 +158,39 @@ def _refuse_entering(dry: bool, slow: float) -> None:
 
 @command.command()
 @click.argument("cell", type=CELL)
+@click.option("--coc", help="Where a robot that takes impedances has its end-effector frame, as run takes it [tool].")
 @click.option("--json", "as_json", is_flag=True, help="What was measured as JSON on stdout.")
-def identify(cell: Path, as_json: bool) -> int:
+def identify(cell: Path, coc: str | None, as_json: bool) -> int:
     """Measure the robot of CELL by small motions in free air: what robot.toml and campaign.toml should say.
 
     A robot that takes positions: delay and bandwidth, against robot.toml. One that takes torques: friction that is left
-    in its joints. Both: noise and bias of the force sensor, and a weight that the robot's payload setting lacks. Move
-    the robot to where the tool has 0.1 m of free air on all sides. Exit code 1 if robot.toml or the payload is wrong.
+    in its joints. One that takes impedances: the stiffness that it renders, friction, and the delay of the
+    feed-forward. All: noise and bias of the force sensor, and a weight that the robot's payload setting lacks. Move
+    the robot to where the tool has 0.1 m of free air on all sides. Exit code 1 if something is wrong.
 
     \b
     Example:
       skillframe drive identify cell.toml
+      skillframe drive identify cell.toml --coc tip
     """
     from skillframe.campaign import to_lines
     from skillframe.cli import emit_json
+    from skillframe.demonstration import resolve_point
     from skillframe_drive.cell import load_cell
     from skillframe_drive.identify import identify as measured
     from skillframe_drive.identify import toml_lines
+    from skillframe_drive.impedance import identify_impedance
     from skillframe_drive.runs import check, load_task, open_link, refuse_problems
 
     task = load_task(load_cell(cell))
+    point = resolve_point(coc, task.scene.tool.frames, "--coc")
     link = open_link(task.cell)
     try:
         refuse_problems(check(task, link, anywhere=True))
         _confirm()
-        found = measured(task, link, partial(click.echo, err=True))
+        say = partial(click.echo, err=True)
+        impedance = link.takes == "impedance"
+        found = identify_impedance(task, link, say, point) if impedance else measured(task, link, say)
     finally:
         link.close()
     tables = toml_lines(found)

@@ -9,7 +9,7 @@ T is a whole number of milliseconds, as robot.toml takes it. T and w give the to
 
 Friction of a robot that takes joint torques: each joint moves to and fro at a constant speed. At one place, gravity's
 error is the same both ways, so that half the difference of the mean torques is the friction which the robot's own
-compensation leaves.
+compensation leaves. What a robot that takes impedances renders is found by `skillframe_drive.impedance`.
 
 Force sensor: at several orientations R of the tool, the wrench in base axes is
 
@@ -30,7 +30,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from skillframe.demonstration import GRAVITY
-from skillframe.errors import InputError, SkillframeError
+from skillframe.errors import SkillframeError
 from skillframe.execution import Setup
 from skillframe.frames import Float, skew
 from skillframe.robot import LOOP_DAMPING, Control, tool_pose
@@ -144,12 +144,13 @@ def fit_sensor(rotations: Float, wrenches: Float) -> Sensor:
     return Sensor(np.array([*bias, *found[:3]]), float(mass), center)
 
 
-class _Robot:
+class Robot:
     """A robot in free air that is led along small motions of its joints."""
 
-    def __init__(self, task: Task, link: Link) -> None:
-        setup = Setup(robot=task.robot, scene=task.scene)
-        self.limb, self.link, self.period = RealLimb(setup, task.believed, link), link, link.period
+    def __init__(self, task: Task, link: Link, point: Float | None = None) -> None:
+        center = np.zeros(3) if point is None else point
+        self.setup = Setup(robot=task.robot, scene=task.scene, center_of_compliance=center)
+        self.limb, self.link, self.period = RealLimb(self.setup, task.believed, link), link, link.period
         self.robot = task.robot
         self.state = link.read()
         self.start = self.state.position.copy()
@@ -184,10 +185,11 @@ class _Robot:
                 whole[0, arm] += torques[k]
                 self.limb.push(whole, np.arange(1))
             states.append(self.state)
-            self._check()
+            self.check()
         return states, torques
 
-    def _check(self) -> None:
+    def check(self) -> None:
+        """Raise `SkillframeError` if the link failed, states were lost, or the force changed."""
         if self.link.fault:
             raise SkillframeError(f"the identification ended: {self.link.fault}")
         force = self.state.wrench[:3]
@@ -207,26 +209,29 @@ class _Robot:
         self.follow(begin + share[:, None] * (end - begin))
 
 
+def at_rest(link: Link) -> Identified:
+    """Measure the noise of the wrench at rest."""
+    found = Identified([], {}, {})
+    still = [link.read() for _ in range(round(MOTIONS.held_s / link.period))]
+    noise = np.std([each.wrench for each in still], axis=0)
+    found.lines.append(Line(f"noise of the wrench {noise[:3].max():.2f} N and {noise[3:].max():.3f} N m at rest"))
+    found.vary["sensor.force_noise"] = [0.0, rounded_up(float(noise[:3].max()))]
+    return found
+
+
 def identify(task: Task, link: Link, say: Callable[[str], None]) -> Identified:
     """Move the robot by small motions in free air, and measure what robot.toml declares.
 
     Args:
         task: the cell.
-        link: to the robot, at rest in free air.
+        link: to the robot, which takes positions or torques, at rest in free air.
         say: prints what is done.
 
     Raises:
-        SkillframeError: the link takes impedances, it failed, or the tool touched something.
+        SkillframeError: the link failed, or the tool touched something.
     """
-    if link.takes == "impedance":
-        text = "takes impedances, and its joints cannot be led one by one"
-        raise InputError(f"link {task.cell.link}", text, "identify the robot through a link that takes torques")
-    robot, found = _Robot(task, link), Identified([], {}, {})
-    still = [link.read() for _ in range(round(MOTIONS.held_s / link.period))]
-    noise = np.std([each.wrench for each in still], axis=0)
-    found.lines.append(Line(f"noise of the wrench {noise[:3].max():.2f} N and {noise[3:].max():.3f} N m at rest"))
-    found.vary["sensor.force_noise"] = [0.0, _up(float(noise[:3].max()))]
-    response: list[complex] = []
+    found = at_rest(link)
+    robot, response = Robot(task, link), list[complex]()
     link.arm()  # from here a robot stops by itself when commands fail to come, so that all fits wait for the end
     try:
         if link.takes == "position":
@@ -237,7 +242,7 @@ def identify(task: Task, link: Link, say: Callable[[str], None]) -> Identified:
             friction = _friction(robot)
             text = ", ".join(f"{each:.2f}" for each in friction)
             found.lines.append(Line(f"friction that is left in the joints: {text} N m"))
-            found.vary["robot.joint_friction"] = [0.0, _up(float(np.abs(friction).max()))]
+            found.vary["robot.joint_friction"] = [0.0, rounded_up(float(np.abs(friction).max()))]
         say("the tool turns by 14 degrees to four sides")
         turned = _turned(robot)
     finally:
@@ -245,11 +250,11 @@ def identify(task: Task, link: Link, say: Callable[[str], None]) -> Identified:
             link.halt()
     if response:
         _add_response(found, fit_response(MOTIONS.sines_hz, response, link.period), task.robot.spec.control)
-    _add_sensor(found, fit_sensor(*turned))
+    add_sensor(found, fit_sensor(*turned))
     return found
 
 
-def _response(robot: _Robot) -> list[complex]:
+def _response(robot: Robot) -> list[complex]:
     """Complex response of the last joint at each frequency."""
     found = []
     for hertz in MOTIONS.sines_hz:
@@ -265,7 +270,7 @@ def _response(robot: _Robot) -> list[complex]:
     return found
 
 
-def _friction(robot: _Robot) -> Float:
+def _friction(robot: Robot) -> Float:
     """Friction (n,) of each joint [N m or N]."""
     rise = MOTIONS.stroke_rad / MOTIONS.stroke_rad_s
     quarter = np.linspace(0.0, MOTIONS.stroke_rad, round(rise / robot.period))
@@ -285,7 +290,7 @@ def _friction(robot: _Robot) -> Float:
     return result
 
 
-def _turned(robot: _Robot) -> tuple[Float, Float]:
+def _turned(robot: Robot) -> tuple[Float, Float]:
     """Rotations (k, 3, 3) of the tool at rest, and mean wrenches (k, 6) there."""
     rotations, wrenches, here = [], [], np.zeros(len(robot.start))
     for joint, sign in ((None, 0.0), (-2, 1.0), (-2, -1.0), (-3, 1.0), (-3, -1.0), (None, 0.0)):
@@ -317,12 +322,13 @@ def _add_response(found: Identified, response: Response, control: Control) -> No
     found.robot.update(delay_s=round(response.delay_s, 3), bandwidth_hz=float(f"{response.bandwidth_hz:.3g}"))
 
 
-def _add_sensor(found: Identified, sensor: Sensor) -> None:
+def add_sensor(found: Identified, sensor: Sensor) -> None:
+    """Add lines and ranges of the sensor's bias, and of the weight that the payload setting lacks."""
     force, torque = sensor.bias[:3], sensor.bias[3:]
     text = f"bias of the sensor {_vector(force, '.1f')} N and {_vector(torque, '.2f')} N m, which a run zeroes"
     found.lines.append(Line(text))
     for kind, values in (("force", force), ("torque", torque)):
-        most = _up(float(np.abs(values).max()))
+        most = rounded_up(float(np.abs(values).max()))
         found.vary.update({f"sensor.{kind}_bias_{axis}": [-most, most] for axis in "xyz"})
     weight = f"weight in the measured wrench: {sensor.mass:+.3f} kg"
     problem = ""
@@ -336,8 +342,8 @@ def _vector(values: Float, form: str) -> str:
     return "[" + ", ".join(format(float(each), form) for each in values) + "]"
 
 
-def _up(value: float) -> float:
-    """A positive value rounded up to two digits."""
+def rounded_up(value: float) -> float:
+    """Round a positive value up to two digits."""
     if value <= 0.0:
         return 0.01
     step = 10.0 ** (math.floor(math.log10(value)) - 1)
