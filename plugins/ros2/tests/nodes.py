@@ -20,10 +20,11 @@ class Nodes:
     Attributes:
         published: whether states are published; answers: whether calls are answered.
         names, position, pose, wrench, frame: what is published; refuse: a parameter that is refused.
-        values: parameters that were set.
+        values: parameters that were set; lost: number of the next calls whose answers are lost.
     """
 
-    def __init__(self, period: float = 0.002) -> None:
+    def __init__(self, period: float = 0.002, lost: int = 0) -> None:
+        self.lost = lost
         self.period, self.published, self.answers, self.refuse = period, True, True, ""
         self.names = ["finger", *reversed(JOINTS)]
         self.position = [9.0, *np.arange(7.0, 0.0, -1.0)]
@@ -40,6 +41,9 @@ class Nodes:
         while not self._ends.is_set():
             count += 1
             for call in dds.taken(self._net.getting) if self.answers else ():
+                if self.lost:
+                    self.lost -= 1
+                    continue
                 known = {
                     "joints": messages.ParameterValue(type=messages.STRINGS, string_array_value=JOINTS),
                     "end_effector_frame": messages.value_of("tip"),

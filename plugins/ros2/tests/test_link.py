@@ -55,6 +55,16 @@ def test_joints_are_those_of_the_controller_in_its_order_and_the_wrench_is_in_ba
     assert state.wrench == pytest.approx([0.0, -1.0, -2.0, 3.0, -4.0, -5.0]) and not link.fault
 
 
+@pytest.mark.slow
+def test_a_call_whose_answer_is_lost_is_made_again():
+    nodes = Nodes(lost=2)
+    try:
+        Ros2Link(HOST).close()
+        assert nodes.lost == 0
+    finally:
+        nodes.close()
+
+
 def test_of_a_faster_robot_every_second_state_is_taken():
     nodes = Nodes(0.001)
     link = Ros2Link(HOST)

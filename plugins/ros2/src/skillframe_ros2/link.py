@@ -120,9 +120,11 @@ class Ros2Link:
         asking, answers = self._calls[kind]
         self._call += 1
         request.client, request.call = self._client, self._call
-        asking.write(request)
-        until = time.monotonic() + wait_s
-        while time.monotonic() < until:
+        begin, sent = time.monotonic(), 0
+        while (waited := time.monotonic() - begin) < wait_s:
+            if waited >= 0.5 * sent:  # [s]; a node may take calls before it sees who reads its answers
+                asking.write(request)
+                sent += 1
             for reply in self._taken(answers):
                 if (reply.client, reply.call) == (self._client, self._call):
                     return reply
@@ -229,7 +231,7 @@ class Ros2Link:
         """Start the process that publishes targets."""
         if self.fault:
             return
-        line, pipe = [sys.executable, "-m", "skillframe_ros2.publisher", self._host], subprocess.PIPE
+        line, pipe = [sys.executable, "-m", "skillframe_ros2.publisher", self._host, str(SILENT_S)], subprocess.PIPE
         self._publisher = subprocess.Popen(line, bufsize=0, start_new_session=True, stdin=pipe, stdout=pipe)
         if self._publisher.stdout.readline() != b"ready\n":
             self.fault = "the process that publishes targets ended at once: its error stands above"

@@ -1,10 +1,10 @@
 """The process that publishes a run's targets, and holds the arm when the run ends, dies or hangs.
 
 crisp_controllers has no watchdog: its arm follows the last target and exerts the last wrench for ever. So the runner
-hands its targets over a pipe, and this process publishes them. Without one for 100 ms, or when the pipe closes, it
+hands its targets over a pipe, and this process publishes them. Without one for SILENT_S, or when the pipe closes, it
 publishes the pose that was measured last, and no wrench.
 
-    python -m skillframe_ros2.publisher HOST
+    python -m skillframe_ros2.publisher HOST SILENT_S
 """
 
 from __future__ import annotations
@@ -17,7 +17,6 @@ import time
 from typing import NamedTuple
 
 import numpy as np
-from skillframe_drive.link import SILENT_S
 
 from skillframe.frames import Float
 from skillframe_ros2.dds import participant, writer
@@ -31,7 +30,7 @@ class Targets(NamedTuple):
     """What is handed over.
 
     Attributes:
-        watched: whether the next is due within 100 ms.
+        watched: whether the next is due within SILENT_S.
         pose: (7,) target, position and quaternion.
         wrench: (6,) target, in the tool's axes.
         measured: (7,) pose, to hold at if no more targets come.
@@ -53,8 +52,8 @@ class Targets(NamedTuple):
         return cls(watched, *np.split(np.array(values), [7, 13]))
 
 
-def main(host: str) -> int:
-    """Publish until the pipe closes. Returns 1 if the arm had to be held."""
+def main(host: str, silent_s: float) -> int:
+    """Publish until the pipe closes, or no target comes for `silent_s` [s]. Returns 1 if the arm had to be held."""
     at = participant(host)
     pose, wrench = writer(at, TARGET_POSE, PoseStamped, NEWEST), writer(at, TARGET_WRENCH, WrenchStamped, NEWEST)
     until = time.monotonic() + 3.0
@@ -66,7 +65,7 @@ def main(host: str) -> int:
     sys.stdout.write("ready\n")
     sys.stdout.flush()
     held = Targets(False, np.zeros(7), np.zeros(6), np.zeros(7))
-    while select.select([0], [], [], SILENT_S if held.watched else None)[0] and (data := _newest()):
+    while select.select([0], [], [], silent_s if held.watched else None)[0] and (data := _newest()):
         held = Targets.unpacked(data)
         wrench.write(wrench_message(Header(), held.wrench))
         pose.write(pose_message(Header(), held.pose))
@@ -90,4 +89,4 @@ def _newest() -> bytes:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
+    sys.exit(main(sys.argv[1], float(sys.argv[2])))
