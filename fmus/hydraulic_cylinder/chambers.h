@@ -82,7 +82,7 @@ static inline void valve(const Model *m, const Motion *w, const double p[2], Cha
     if (open <= 0.0) return;
     double wide_in = v[feeds == A ? EDGE_PA : EDGE_PB], wide_out = v[drains == A ? EDGE_AT : EDGE_BT];
     double drop = v[SUPPLY_PRESSURE] - v[SUPPLY_DROP] - p[feeds];
-    Edge in = {0.0, 0.0, 0.0};
+    Edge in = {0.0, 0.0, 0.0, 0.0};
     if (drop >= 0.0 || (v[FEED_CHECK] == 0.0 && held_at(m, feeds, p).open < 0.0))
         in = through_edge(m, wide_in * open, wide_in * rate, drop, 0.0, 0.0, -1.0);
     double room = drains == A ? w->position : v[STROKE] - w->position;
