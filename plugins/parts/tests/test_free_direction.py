@@ -26,7 +26,9 @@ def test_a_bar_in_a_long_slot_slides_along_it_and_worlds_says_so(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "parts", [slot(1.9), round_pair(), slot(3.0, wall=(11.0, 13.0))], ids=["short", "round", "wall"]
+    "parts",
+    [slot(1.9), round_pair(), slot(3.0, wall=(11.0, 13.0)), slot(3.0, wall=(-13.0, -11.0))],
+    ids=["short", "round", "wall", "wall at the other end"],
 )
 def test_a_part_that_something_holds_within_the_tolerance_slides_nowhere(tmp_path, parts):
     assert found(tmp_path, parts) == (None, [])
