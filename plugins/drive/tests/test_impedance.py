@@ -32,14 +32,14 @@ def task(monkeypatch):
 
 
 def test_stiffness_and_friction_are_those_of_a_loop_with_sticking_at_its_turns():
-    """Equation (1) with k = 900 N/m, 5 N of friction that holds, 3 N of load, and 2 rad of joints a metre."""
+    """Equation (1) with k = 900 N/m, D = 150 Ns/m, 5 N of friction that holds, 3 N of load, and 2 rad a metre."""
     push = 30.0 * np.concatenate([np.linspace(-1.0, 1.0, 1000), np.linspace(1.0, -1.0, 1000)])
     place, at = np.empty(2000), (-30.0 + 5.0 - 3.0) / 900.0
     for k, f in enumerate(push):
         at = min(max(at, (f - 3.0 - 5.0) / 900.0), (f - 3.0 + 5.0) / 900.0)
         place[k] = at
     speed = np.gradient(place, 0.002)
-    found = fit_loop(push, place, np.zeros(2000), speed, 2.0 * np.abs(speed))
+    found = fit_loop(push + 150.0 * speed, place, 150.0 * speed, speed, 2.0 * np.abs(speed))
     assert found.stiffness == pytest.approx(900.0, rel=1e-3)
     assert found.friction == pytest.approx(5.0, rel=1e-2) and found.joint == pytest.approx(2.5, rel=1e-2)
 
