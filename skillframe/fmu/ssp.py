@@ -94,10 +94,10 @@ def _structure(name: str, components: Sequence[Component], known: Mapping[str, F
                 shown.add(connector)
                 ends = {f"{near}Element": each.name, f"{near}Connector": theirs, f"{far}Connector": connector}
                 ET.SubElement(connections, "ssd:Connection", ends)
-    told = ET.SubElement(annotations, "ssc:Annotation", {"type": "org.openmodelica"})
-    told = ET.SubElement(ET.SubElement(told, "oms:Annotations"), "oms:SimulationInformation")
+    notes = ET.SubElement(annotations, "ssc:Annotation", {"type": "org.openmodelica"})
+    notes = ET.SubElement(ET.SubElement(notes, "oms:Annotations"), "oms:SimulationInformation")
     master = {"description": "oms-ma", "stepSize": exact, "relativeTolerance": "0.0001"}
-    ET.SubElement(told, "oms:FixedStepMaster", master)
+    ET.SubElement(notes, "oms:FixedStepMaster", master)
     used.define(root, "ssd")
     ET.SubElement(root, "ssd:DefaultExperiment", {"startTime": "0"})
     return root

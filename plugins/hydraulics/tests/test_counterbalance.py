@@ -37,7 +37,7 @@ EXTRA = ("burst_a", "burst_b", "supply_drop")
 
 
 def ridden(parameters, command, seconds, extra=lambda t: (0.0, 0.0, 0.0), place=0.4):
-    """A mass on a cylinder, rows of x, v, p_a and p_b at every step: the cylinder is told a, and answers its force."""
+    """A mass on a cylinder, rows of x, v, p_a and p_b at every step: it takes a and gives the force."""
     names = {name: name for name in (*INPUTS, *EXTRA)}
     bank = open_cylinders([ActuatorSpec(fmu="hydraulic_cylinder", parameters=parameters, inputs=names)])
     at = [bank.inputs.index(name) for name in names]

@@ -106,8 +106,8 @@ def test_check_holds_the_setting_against_the_load(changed, line, code, said):
 
 def test_a_setting_in_bar_without_its_unit_is_refused(changed, capsys):
     assert run(["robots", str(changed(NAME, (WRITTEN, valve(setting="210")))), "--check"]) != 0
-    told = capsys.readouterr()
-    assert 'did you mean "210 bar"' in told.out + told.err
+    printed = capsys.readouterr()
+    assert 'did you mean "210 bar"' in printed.out + printed.err
 
 
 def test_a_valve_at_either_port_is_refused(changed):

@@ -25,6 +25,14 @@ def test_a_bar_in_a_long_slot_slides_along_it_and_worlds_says_so(tmp_path):
     assert "slides freely by 2 mm both ways along (0, 1, 0)" in said
 
 
+def test_a_tight_slot_at_any_angle_is_found(tmp_path):
+    """0.02 mm of play, which lets a bar go 2 mm only within 0.6 degrees of the slot."""
+    bar = box((-5.0, -10.0, -12.0), (5.0, 10.0, 8.0)).rotate([0.0, 0.0, 25.0])
+    block = box((-25.0, -40.0, -17.0), (25.0, 40.0, 0.0)) - box((-5.02, -13.0, -12.0), (5.02, 13.0, 1.0))
+    along, _ = found(tmp_path, (bar, block.rotate([0.0, 0.0, 25.0])))
+    assert abs(float(np.dot(along, [-np.sin(np.radians(25.0)), np.cos(np.radians(25.0)), 0.0]))) > np.cos(0.01)
+
+
 @pytest.mark.parametrize(
     "parts",
     [slot(1.9), round_pair(), slot(3.0, wall=(11.0, 13.0)), slot(3.0, wall=(-13.0, -11.0))],

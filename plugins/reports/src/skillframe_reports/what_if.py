@@ -146,25 +146,11 @@ def _effect(
     known = [each for i, _ in groups if len(each := values[i][np.isfinite(values[i])])]
     p_value = None
     if not poor:
+        from scipy import stats  # not needed for a page without a table
+
         alike = len(known) < 2 or np.ptp(np.concatenate(known)) == 0.0
-        p_value = 1.0 if alike else kruskal(known)
+        p_value = 1.0 if alike else float(stats.kruskal(*known).pvalue)
     return Effect(skill, what, p_value, poor, f"{low[1]} {low[2]}", f"{high[1]} {high[2]}")
-
-
-def kruskal(samples: Sequence[Float]) -> float:
-    """Return the p value of the test for samples (n_i,), corrected for ties.
-
-    It is that of scipy.stats.kruskal, which takes half a second to load.
-    """
-    from scipy.special import chdtrc  # not needed for a page without a table
-
-    _, place, count = np.unique(np.concatenate(samples), return_inverse=True, return_counts=True)
-    rank = (np.cumsum(count) - 0.5 * (count - 1))[place]
-    total, ends = len(rank), np.cumsum([len(each) for each in samples])
-    squares = sum(float(part.sum() ** 2) / len(part) for part in np.split(rank, ends[:-1]))
-    ties = 1.0 - float(np.sum(count.astype(float) ** 3 - count)) / (total**3 - total)
-    statistic = (12.0 * squares / (total * (total + 1)) - 3.0 * (total + 1)) / ties
-    return float(chdtrc(len(samples) - 1, statistic))
 
 
 def _span(span: tuple[float, float], name: ShownQuantity) -> str:
