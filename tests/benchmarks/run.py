@@ -24,7 +24,7 @@ sys.path.insert(0, str(ROOT))
 
 from skillframe.campaign.runner import CHUNK  # noqa: E402
 from skillframe.world.quantities import SensorSettings  # noqa: E402
-from tests.benchmarks import crane, engine, interfaces, parts, segmenter  # noqa: E402
+from tests.benchmarks import crane, engine, interfaces, parts, runner, segmenter  # noqa: E402
 from tests.benchmarks.timing import Recorded, one_trial_loop, replay, timed_run  # noqa: E402
 from tests.laws.pushing import Push, impedance  # noqa: E402
 from tests.laws.runs import setup  # noqa: E402
@@ -238,6 +238,7 @@ def main():
     two_arms()
     interfaces.ratios(show)
     interfaces.real_time(show)
+    runner.rows(show)
     parts.rows(show)
     crane.rows(show)
     segmenter.measure(show)

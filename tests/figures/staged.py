@@ -30,8 +30,8 @@ class StagedTask(NamedTuple):
 
 
 TASKS = {
-    "valley 45": StagedTask("valley", {"along": 0.05}, moves=(0.0, 1.0, 0.0)),
-    "valley 30": StagedTask("valley", {"along": 0.05, "slope": float(np.deg2rad(30.0))}, moves=(0.0, 1.0, 0.0)),
+    "valley 45": StagedTask("valley", {"wall_distance": 0.05}, moves=(0.0, 1.0, 0.0)),
+    "valley 30": StagedTask("valley", {"wall_distance": 0.05, "slope": float(np.deg2rad(30.0))}, moves=(0.0, 1.0, 0.0)),
     "corner": StagedTask("corner", {}, moves=(0.5**0.5, 0.5**0.5, 0.0)),
     "hose coupler": StagedTask("hose_coupler", {"interlock": 0.7}, turns=(0.0, 0.0, 1.0)),
 }

@@ -56,7 +56,9 @@ TASKS = {
         center="tip",
         seed=8100,  # detours are joined by a rule that was made on a policy of 8000
     ),
-    "valley: slide, then along": Whole("valley", {"along": 0.05}, {"start.offset_x": 0.01, "start.offset_y": 0.005}),
+    "valley: slide, then along": Whole(
+        "valley", {"wall_distance": 0.05}, {"start.offset_x": 0.01, "start.offset_y": 0.005}
+    ),
     "corner: set down, push in": Whole(
         "corner",
         {},

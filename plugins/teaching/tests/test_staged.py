@@ -18,7 +18,7 @@ THERE = (100, 300, 300, 10_000)  # tick at which each ball is at the valley's bo
 
 def scenario():
     """A valley, fixtures that stand apart, and what is observed of each tool at each tick."""
-    scene = load_world("valley", {"along": 0.04})
+    scene = load_world("valley", {"wall_distance": 0.04})
     rng = np.random.default_rng(1)
     fixture = Pose(rng.normal(size=(COUNT, 3)), rotation_matrix(0.3 * rng.normal(size=(COUNT, 3))))
     down = np.diag([1.0, -1.0, -1.0])

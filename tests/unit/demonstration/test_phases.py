@@ -88,7 +88,7 @@ def test_the_answer_is_the_same_in_another_base():
     ("world", "changes", "several"),
     [
         ("valley", {}, False), ("peg_in_hole", {}, False), ("funnel", {}, False), ("edge", {}, False),
-        ("corner", {}, False), ("hose_coupler", {}, False), ("valley", {"along": 0.05}, True),
+        ("corner", {}, False), ("hose_coupler", {}, False), ("valley", {"wall_distance": 0.05}, True),
         ("hose_coupler", {"interlock": 0.7}, True),
     ],
 )  # fmt: skip

@@ -83,7 +83,7 @@ def test_a_ball_beyond_the_ends_of_the_valley_is_not_at_its_bottom(scene):
     valley, high = scene("valley"), 0.005 * np.sqrt(2.0)
     assert done(valley, (0.0, 0.0799, high)) and done(valley, (0.0, -0.0799, high))
     assert not done(valley, (0.0, 0.0801, high)) and not done(valley, (0.0, -0.2, high))
-    walled = scene("valley", along=0.05)
+    walled = scene("valley", wall_distance=0.05)
     assert done(walled, (0.0, 0.0495, high)) and not done(walled, (0.0, 0.0801, high))
 
 

@@ -17,7 +17,7 @@ UNITS: tuple[tuple[str, str, float], ...] = (
     ("payload|mass", "kg", 1.0),
     ("delay", "ms", 1e3),
     ("deadband", "%", 1e2),
-    ("offset|position|clearance|depth|radius|length|width|height|gap|tolerance|fillet|above|away|along", "mm", 1e3),
+    ("offset|position|clearance|depth|radius|length|width|height|gap|tolerance|fillet|above|away|distance", "mm", 1e3),
 )
 """Words of a name, display unit and factor; the first match counts."""
 

@@ -38,8 +38,8 @@ class ValleyParams:
         radius: of the ball at the tip [m, 0.1mm to 200mm].
         length: of each side along the slope [m, 1mm to 2m].
         tolerance: horizontal distance from the bottom that counts as reached [m, 1um to 100mm].
-        along: distance towards +y to a wall that is the goal [m, 0m to 70mm] (seed, Fig. 17: two phases); 0 for no wall
-            and the bottom as the goal.
+        wall_distance: distance towards +y to a wall that is the goal [m, 0m to 70mm] (seed, Fig. 17: two phases); 0 for
+            no wall and the bottom as the goal.
     """
 
     slope: float = 0.7853981633974483
@@ -47,15 +47,15 @@ class ValleyParams:
     radius: float = 0.005
     length: float = 0.12
     tolerance: float = 0.001
-    along: float = 0.0
+    wall_distance: float = 0.0
 
 
 def build(params: ValleyParams) -> Scene:
     """The scene, with the valley along y through the fixture's origin.
 
-    The goal is a ball at the bottom, between its ends, and with `along` at the wall.
+    The goal is a ball at the bottom, between its ends, and with `wall_distance` at the wall.
     """
-    require("valley", {"along < 0.07 m": params.along < 0.07}, params)
+    require("valley", {"wall_distance < 0.07 m": params.wall_distance < 0.07}, params)
     resting, width = params.radius / np.cos(params.slope), 0.16  # m along the valley
     ball = Geom(kind="sphere", size=(params.radius,), position=(0.0, 0.0, WRIST_TO_TIP), rgba=TOOL_COLOUR)
 
@@ -70,17 +70,17 @@ def build(params: ValleyParams) -> Scene:
         return reached
 
     def remaining(state: State) -> Float:
-        return np.maximum(params.along - state.tip.position[..., 1], 0.0)
+        return np.maximum(params.wall_distance - state.tip.position[..., 1], 0.0)
 
     def at_wall(state: State) -> NDArray[np.bool_]:
         reached: NDArray[np.bool_] = at_bottom(state) & (remaining(state) < params.tolerance)
         return reached
 
-    goal = at_wall if params.along else at_bottom
+    goal = at_wall if params.wall_distance else at_bottom
     thick = 0.005  # m
-    place = (0.0, params.along + params.radius + thick, 0.03)
+    place = (0.0, params.wall_distance + params.radius + thick, 0.03)
     wall = Geom(kind="box", size=(0.03, thick, 0.03), position=place, rgba=FIXTURE_COLOUR)
-    walls = (wall,) if params.along else ()
+    walls = (wall,) if params.wall_distance else ()
     slide_along = Task(direction=(0.0, 0.8, -0.6), hand="sliding")
     return Scene(
         name="valley",
@@ -92,12 +92,12 @@ def build(params: ValleyParams) -> Scene:
         start_lift=lambda offset, tilt: np.abs(offset[..., 0]) * np.tan(params.slope),
         goal=goal,
         goal_error=lambda state: (
-            distance(state) + (remaining(state) if params.along else 0.0), np.zeros(len(state.tip.position))
+            distance(state) + (remaining(state) if params.wall_distance else 0.0), np.zeros(len(state.tip.position))
         ),
         task=Task(
             direction=(0.0, 0.0, -1.0), hand="sliding",
             starts=({"start.offset_x": 0.04}, {"start.offset_x": -0.04}),
-            done=at_bottom if params.along else None, then=(slide_along,) if params.along else (),
+            done=at_bottom if params.wall_distance else None, then=(slide_along,) if params.wall_distance else (),
         ),
         analytic={"largest_tilt_rad": float(params.slope - np.arctan(params.friction))},
     )  # fmt: skip

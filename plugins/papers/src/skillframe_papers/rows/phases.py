@@ -36,7 +36,7 @@ class Staged(NamedTuple):
 
 
 TASKS = {
-    "valley": Staged("valley", (("along", 0.05),), (0.0, 1.0, 0.0)),
+    "valley": Staged("valley", (("wall_distance", 0.05),), (0.0, 1.0, 0.0)),
     "corner": Staged("corner", (), (0.5**0.5, 0.5**0.5, 0.0)),
     "hose coupler": Staged("hose_coupler", (("interlock", 0.7),), (0.0, 0.0, 1.0), turns=True),
 }
