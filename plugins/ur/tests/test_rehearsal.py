@@ -2,9 +2,10 @@
 
 import re
 import shutil
+from pathlib import Path
 
 import pytest
-from rehearsal import cell, rehearse
+from rehearsal import cell, host, rehearse
 
 import skillframe
 from skillframe.execution.trace import Trace
@@ -37,6 +38,18 @@ def test_the_valley_through_the_real_client_is_the_simulated_one(tmp_path, valle
     trace = Trace.load(out)
     assert 0.9 * min(durations) < trace.meta["duration_s"] < 1.1 * max(durations)
     assert trace.meta["source"] == "real" and trace.meta["link"] == "ur"
+
+
+@pytest.mark.slow
+def test_the_cell_and_the_rehearsal_of_the_page_end_well(tmp_path, valley_skill):
+    page = (Path(__file__).parents[3] / "docs" / "how-to" / "drive.md").read_text()
+    text = re.search(r"```toml\n(# cell\.toml\n.*?)```", page, re.DOTALL)[1]
+    assert 'host = "192.168.0.10"' in text and 'witness = "person"' in text
+    written = tmp_path / "cell.toml"
+    written.write_text(text.replace("192.168.0.10", host()).replace('"person"', '"pose"'))
+    truth = re.search(r"drive fake ur --world valley (.*) --lockstep", page)[1].split()
+    ended = rehearse("ur", ["run", str(valley_skill), "--cell", str(written)], *truth)
+    assert ended.code == 0 and "success" in ended.said and "the task is done" in ended.fake, ended
 
 
 @pytest.mark.slow
