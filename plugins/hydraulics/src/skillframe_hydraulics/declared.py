@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from typing import Literal
 
@@ -54,22 +54,28 @@ class DeclaredSupply:
     """`[supply.NAME]` of robot.toml: a pump and its line. Their pressures are those of the actuators that they feed.
 
     Attributes:
-        kind: "constant" holds supply_pressure, "load_sensing" the highest load's pressure and a margin.
+        kind: "constant" holds supply_pressure, "load_sensing" the highest load's pressure and a margin; "open_centre"
+            gives its flow always, which returns through its valves' centres, and has its relief at supply_pressure.
         flow: largest flow of the pump [m3/s, 1l/min to 6000l/min].
         volume: of the line, with hoses [m3, 0.05l to 500l].
         response: time constant of the pump [s, 1ms to 2s].
         power: largest hydraulic power of the pump [W, 100W to 2000kW]; None: not limited.
         margin: of a load-sensing pump above the highest load [Pa, 1bar to 100bar].
+        centre_drop: of open centres, from line to return line at the pump's flow with all spools in their middle
+            [Pa, 1bar to 100bar].
+        centre_shut: of open centres, share of a spool's travel at which its centre edge is shut [0.2 to 1].
         sharing: "law" slows all motion down together where the pump is too small for it, "none" does not.
         feeds: joints of the actuators that it feeds; empty: all.
     """
 
-    kind: Literal["constant", "load_sensing"] = "constant"
+    kind: Literal["constant", "load_sensing", "open_centre"] = "constant"
     flow: float
     volume: float
     response: float = 0.06
     power: float | None = None
     margin: float = 20e5
+    centre_drop: float = 12e5
+    centre_shut: float = 1.0
     sharing: Literal["law", "none"] = "law"
     feeds: tuple[str, ...] = ()
 
@@ -101,7 +107,7 @@ def impossible_supplies(spec: RobotSpec) -> Iterator[tuple[str, str, str]]:
                 fix = "say under feeds of each which joints it feeds"
                 yield f"{key}.feeds", f"both it and supply.{other} feed {joint}", fix
                 return
-            if lacking := _unmapped(joints[joint]):
+            if lacking := _unmapped(joints[joint], one):
                 fix = "map it under inputs or outputs of its [[actuation]], or leave it out of feeds"
                 yield f"{key}.feeds", f"the FMU of {joint} has no {', '.join(lacking)}, by which a line feeds it", fix
                 return
@@ -121,6 +127,8 @@ def impossible_supplies(spec: RobotSpec) -> Iterator[tuple[str, str, str]]:
         if one.kind == "load_sensing" and one.margin >= pressure:
             text = f"is {one.margin / 1e5:g} bar, not below the supply_pressure of {pressure / 1e5:g} bar"
             yield f"{key}.margin", text, "give 10 to 30 bar, as usual"
+        if one.kind == "open_centre":
+            yield from _impossible_centre(key, one, [joints[joint] for joint in fed(spec, one)])
         leaked = sum(float(row.get("leakage", 0.0)) for row in own) * pressure
         most = one.flow if one.power is None else min(one.flow, one.power / max(pressure, 1.0))
         if leaked >= most:
@@ -128,12 +136,27 @@ def impossible_supplies(spec: RobotSpec) -> Iterator[tuple[str, str, str]]:
             yield key, f"{text} gives {6e4 * most:.3g}", "give a larger flow or power, or less leakage"
 
 
-def _unmapped(actuation: Actuation) -> list[str]:
+def _unmapped(actuation: Actuation, supply: DeclaredSupply) -> list[str]:
     """What an actuator of another maker does not map and a line needs."""
     if actuation.fmu == "hydraulic_cylinder":
         return []
     mapped = {*actuation.inputs, *actuation.outputs}
-    return [name for name in ("supply_drop", "flow_supply", "supply_slope") if name not in mapped]
+    needed = ("supply_drop", "flow_supply", "supply_slope", *(("spool",) if supply.kind == "open_centre" else ()))
+    return [name for name in needed if name not in mapped]
+
+
+def _impossible_centre(key: str, supply: DeclaredSupply, fed: Iterable[Actuation]) -> Iterator[tuple[str, str, str]]:
+    """What a pump of open centres cannot work with."""
+    own = list(fed)
+    loose = [a.joint for a in own if a.fmu == "hydraulic_cylinder" and not a.known.get("feed_check", False)]
+    if loose:
+        text = f"has open centres, and without a load check valve a load sinks into its line: {', '.join(loose)}"
+        yield key, text, "write feed_check = true in its parameters, or in [defaults.cylinder]"
+    least = max((float(a.known.get("return_pressure", 0.0)) for a in own), default=0.0) + supply.centre_drop
+    relief = min((float(a.known["supply_pressure"]) for a in own if "supply_pressure" in a.known), default=math.inf)
+    if least >= relief:
+        text = f"and the return_pressure are {least / 1e5:g} bar, and its relief opens at {relief / 1e5:g} bar"
+        yield f"{key}.centre_drop", text, "give the drop with all spools in their middle, 5 to 20 bar as usual"
 
 
 def impossible(actuation: tuple[Actuation, ...], sensors: MachineNoise, gains: Gains) -> Iterator[tuple[str, str, str]]:

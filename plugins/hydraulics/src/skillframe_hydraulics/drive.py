@@ -304,7 +304,8 @@ class MachineDrive:
 
     def notes(self, i: int) -> list[str]:
         """Notes of controller, FMUs and identification."""
-        return [*self.law.notes, *self.bank.notes, *self._unmapped, *self.findings[i], *self._full(i)]
+        waste = [] if self.supplies is None else self.supplies.waste(i)
+        return [*self.law.notes, *self.bank.notes, *self._unmapped, *self.findings[i], *self._full(i), *waste]
 
     def _full(self, i: int) -> list[str]:
         return [] if self.supplies is None else [*self.supplies.said(i), *self._sharing.said(i)]

@@ -22,6 +22,7 @@ class Bounds:
         still: number of equal readings that mean a stopped sensor.
         sure: standard deviations of noise, exceeded once in 1e15.
         sunken: pressure below the return line's, whose check valve passes 1e-3 m3/s at 1e5 [Pa]; vacuum: gauge [Pa].
+        emptied: as sunken, of chambers that open centres let run empty [Pa]; filling: of a check valve [m3/(s Pa)].
         moving: speed of a moving piston for noiseless sensors [m/s].
         window: checks per balance; lags: in checks, 20 to 60 ms, of which the shipped crane needs 20.
         floor, floor_in_swing: tolerated motion of the piston [m]; share: of the flow.
@@ -38,6 +39,8 @@ class Bounds:
     sure: float = 8.0
     sunken: float = 2e5
     vacuum: float = -1e5
+    emptied: float = 4e5
+    filling: float = 1e-8
     moving: float = 5e-3
     window: int = 5
     lags: tuple[int, ...] = (1, 2, 3)
@@ -80,16 +83,19 @@ class Knowledge(NamedTuple):
     ratio: Float
 
 
-def balance_function(c: Cylinders, period: float) -> ca.Function:
+def balance_function(c: Cylinders, period: float, open_centre: bool = False) -> ca.Function:
     """A check of one machine with k cylinders: (1), the sums of (2), and whether the usual lag explains all.
 
     Inputs, (k,) each: mean command since the last check, pressures a and b, piston; the fields of `Knowledge`;
     tolerance [m] of a balance, and of a spool. Then sums of (2), and readings, at the last checks, rows of k.
     Outputs: these with the new check first; volumes of both chambers, and their compressed part; 1 if all balances are
     explained; 1 if all spools may be in place.
+
+    Of open centres the command comes in two halves (2k,), means of its positive and of its negative part, as spools
+    change over within a period; and a chamber below the return line's pressure may fill through its check valve.
     """
     k, length = len(c.area_a), BOUNDS.length
-    given = [ca.SX.sym(f"given{i}", k) for i in range(12)]
+    given = [ca.SX.sym(f"given{i}", 2 * k if open_centre and i == 0 else k) for i in range(12)]
     valve, p_a, p_b, piston, *known, floor, spool_floor = given
     sums, readings = (ca.SX.sym(name, k, length * rows) for name, rows in (("sums", 10), ("readings", 3)))
     swung = Knowledge(*known)
@@ -99,31 +105,12 @@ def balance_function(c: Cylinders, period: float) -> ca.Function:
     check_a = check_b = c.feed_check
     if own := c.counterbalance:
         check_a, check_b = np.maximum(check_a, own.holds_a), np.maximum(check_b, own.holds_b)
-    ends = {
-        laminar: [
-            _edge(c, pressure, fills, supply - spread if laminar else supply + spread, laminar, shares)
-            for pressure, fills, shares in (
-                (p_a, valve > 0.0, (c.edge_pa, c.edge_at, check_a)),
-                (p_b, valve <= 0.0, (c.edge_pb, c.edge_bt, check_b)),
-            )
-        ]
-        for laminar in (True, False)
-    }
-    volumes = []  # lower and upper ends of (2) into both chambers, and both ends for the likely overlaps
-    for overlap, ratio, laminar in (
-        (swung.overlap, 1.0, True), (swung.overlap, 1.0, False),
-        (swung.most, swung.ratio, True), (swung.least, swung.ratio, False),
-    ):  # fmt: skip
-        opening = minimum(maximum(ca.fabs(valve) - overlap, 0.0) / (1.0 - overlap), 1.0) * ratio
-        passed = [period * c.edge * opening * each for each in ends[laminar]]
-        if own:  # that opens late, or early
-            off = BOUNDS.setting if laminar else -BOUNDS.setting
-            late = replace(own, **{at: getattr(own, at) + off for at in ("counterbalance_a", "counterbalance_b")})
-            passed = [
-                volume * ca.if_else(volume < 0.0, narrowing(c.edge * opening * wide, held), 1.0)
-                for volume, wide, held in zip(passed, (c.edge_at, c.edge_bt), conductances(late, p_a, p_b), strict=True)
-            ]
-        volumes += passed
+    checks = check_a, check_b
+    halves = [_volumes(c, period, part, (p_a, p_b), (supply, spread), swung, checks) for part in ca.vertsplit(valve, k)]
+    volumes = halves[0] if not open_centre else [one + other for one, other in zip(*halves, strict=True)]
+    if open_centre:
+        for i, pressure in ((2, p_a), (3, p_b), (6, p_a), (7, p_b)):  # the upper ends
+            volumes[i] += period * BOUNDS.filling * maximum(c.return_pressure - pressure, 0.0)
     sizes = ca.horzcat(*map(ca.fabs, volumes[2:4]), *volumes)
     told, seen = ca.horzcat(sizes + sums[:, :10], sums[:, :-10]), ca.horzcat(piston, p_a, p_b, readings[:, :-3])
     gone = seen[:, :3] - seen[:, 3 * BOUNDS.window : 3 * BOUNDS.window + 3]
@@ -138,6 +125,43 @@ def balance_function(c: Cylinders, period: float) -> ca.Function:
     off = ca.fabs(taken - usual[:, 6:8]) > loose
     explained = ca.vertcat(ca.sum1(ca.sum2(closed)) >= 2 * k, ca.sum1(off[:, 0] * off[:, 1]) < 1)
     return ca.Function("balance", [*given, sums, readings], [told, seen, taken, squeezed, explained])
+
+
+def _volumes(
+    c: Cylinders, period: float, valve: ca.SX, pressures: tuple[ca.SX, ca.SX], lines: tuple[ca.SX, ca.SX],
+    swung: Knowledge, checks: tuple[Float, Float],
+) -> list[ca.SX]:  # fmt: skip
+    """Lower and upper ends of (2) into both chambers, and both ends for the likely overlaps.
+
+    `lines` are the supply and its spread [Pa].
+    """
+    (p_a, p_b), (supply, spread) = pressures, lines
+    ends = {
+        laminar: [
+            _edge(c, pressure, fills, supply - spread if laminar else supply + spread, laminar, shares)
+            for pressure, fills, shares in (
+                (p_a, valve > 0.0, (c.edge_pa, c.edge_at, checks[0])),
+                (p_b, valve <= 0.0, (c.edge_pb, c.edge_bt, checks[1])),
+            )
+        ]
+        for laminar in (True, False)
+    }
+    volumes = []
+    for overlap, ratio, laminar in (
+        (swung.overlap, 1.0, True), (swung.overlap, 1.0, False),
+        (swung.most, swung.ratio, True), (swung.least, swung.ratio, False),
+    ):  # fmt: skip
+        opening = minimum(maximum(ca.fabs(valve) - overlap, 0.0) / (1.0 - overlap), 1.0) * ratio
+        passed = [period * c.edge * opening * each for each in ends[laminar]]
+        if own := c.counterbalance:  # that opens late, or early
+            off = BOUNDS.setting if laminar else -BOUNDS.setting
+            late = replace(own, **{at: getattr(own, at) + off for at in ("counterbalance_a", "counterbalance_b")})
+            passed = [
+                volume * ca.if_else(volume < 0.0, narrowing(c.edge * opening * wide, held), 1.0)
+                for volume, wide, held in zip(passed, (c.edge_at, c.edge_bt), conductances(late, p_a, p_b), strict=True)
+            ]
+        volumes += passed
+    return volumes
 
 
 def _edge(

@@ -6,7 +6,8 @@ For a line of volume V with oil of bulk modulus B, a pump with the time constant
     Q_w = sum q_i + V/(2 tau B) (p_w - p_S),    p_w = p_0, or min(p_L + margin, p_0) of a load-sensing pump,        (2)
 
 with p_L the largest pressure among the chambers that open valves feed, and a relief q_R from 1.1 p_0 on, which passes
-Q_max at 1.2 p_0. The gain of (2) gives a damping ratio of 0.7 with shut valves (our choice).
+Q_max at 1.2 p_0. The gain of (2) gives a damping ratio of 0.7 with shut valves (our choice). For open centres
+Q_w = Q_max, and q_R is that of a relief from p_0 to 1.1 p_0 and of the bypass (`skillframe_hydraulics.open_centre`).
 
 Each step H is of second order and linearly implicit, so that it settles for every V: the line's pressure p~ at its end
 is predicted with the slopes s = sum dq_i/dp_S, all actuators step at (p + p~)/2, and the prediction is corrected,
@@ -29,6 +30,7 @@ from skillframe.fmu import Actuators
 from skillframe.frames import Float
 from skillframe.robot import RobotSpec
 from skillframe_hydraulics.declared import fed, supplies_of
+from skillframe_hydraulics.open_centre import bypass, conductance, narrowed
 
 NEEDED_IN, NEEDED_OUT = "supply_drop", ("flow_supply", "supply_slope")
 """Input and outputs of an actuator that is fed by a declared supply."""
@@ -43,6 +45,8 @@ class Lines(NamedTuple):
         names: of the supplies; feeds: (L, k), 1 where an actuator is fed.
         flow: Q_max (L,) [m3/s]; power: P, infinite if not limited [W]; margin: infinite unless load-sensing [Pa].
         response: tau [s]; softness: V/B [m3/Pa].
+        drop: of open centres with all spools in their middle [Pa], 0 of other pumps; shut: x_C of open centres.
+        outlet: pressure of the return line, needed of open centres [Pa].
     """
 
     names: tuple[str, ...]
@@ -52,6 +56,9 @@ class Lines(NamedTuple):
     margin: Float
     response: Float
     softness: Float
+    drop: Float = np.zeros(1)
+    shut: Float = np.ones(1)
+    outlet: Float = np.zeros(1)
 
     def most(self, pressure: Float) -> Float:
         """Largest flow (N, L) [m3/s] at pressures (N, L)."""
@@ -63,12 +70,17 @@ def lines_of(spec: RobotSpec) -> Lines:
     declared = supplies_of(spec)
     feeds: Float = np.array([[a.joint in fed(spec, one) for a in spec.actuation] for one in declared.values()], float)
     each = list(declared.values())
-    bulk = feeds @ np.array([float(a.known["bulk_modulus"]) for a in spec.actuation]) / feeds.sum(axis=1)
+    bulk, outlet = (
+        feeds @ np.array([float(a.known[name]) for a in spec.actuation]) / feeds.sum(axis=1)
+        for name in ("bulk_modulus", "return_pressure")
+    )
     return Lines(
         tuple(declared), feeds, np.array([one.flow for one in each]),
         np.array([np.inf if one.power is None else one.power for one in each]),
         np.array([one.margin if one.kind == "load_sensing" else np.inf for one in each]),
         np.array([one.response for one in each]), np.array([one.volume for one in each]) / bulk,
+        np.array([one.centre_drop if one.kind == "open_centre" else 0.0 for one in each]),
+        np.array([one.centre_shut for one in each]), outlet,
     )  # fmt: skip
 
 
@@ -84,8 +96,9 @@ class Supplies:
     Attributes:
         pressure: p_S (N, L) [Pa]; flow: Q (N, L) [m3/s].
         taken: sum of q_i (N, L) [m3/s]; relieved: q_R (N, L) [m3/s].
-        full: (N, L) time for which the pump gave all it can [s], `first` when that began (NaN if never), and `lowest`
-            pressure since [Pa]; time: [s].
+        full: (N, L) time for which the actuators took all that the pump can give [s], `first` when that began (NaN if
+            never), and `lowest` pressure since [Pa]; time: [s].
+        given, wasted: (N, L) energies of Q and of q_R since `start` [J].
     """
 
     def __init__(self, lines: Lines, bank: Actuators, nominal: Float, deadband: Float, dt: float) -> None:
@@ -95,21 +108,28 @@ class Supplies:
         columns = (*NEEDED_OUT, "spool", "pressure_a", "pressure_b")
         self._y = [bank.y[:, bank.outputs.index(name)].reshape(count, k) for name in columns]
         self._rated: Float = np.max(nominal[:, None] * lines.feeds, axis=-1)
+        self._open = lines.drop > 0.0
+        self._opens: Float = np.where(self._open, 1.0, 1.1) * self._rated
         self._relief: Float = lines.flow / (0.1 * self._rated)
+        self._centre: Float = np.where(self._open, conductance(lines.flow, np.maximum(lines.drop, 1.0)), 0.0)
+        self._share: Float = lines.feeds / lines.feeds.sum(axis=-1, keepdims=True)
         self._line = np.argmax(lines.feeds, axis=0)
         self._is_fed = lines.feeds.any(axis=0)
         self._stiff: Float = dt / lines.softness
         self._lag: Float = -np.expm1(-dt / lines.response)
         borne = np.max(np.maximum(*self._y[3:])[:, None] * lines.feeds, axis=-1)
-        self.pressure: Float = np.minimum(borne + lines.margin, self._rated)
-        self.taken, self.relieved, self.flow = (np.zeros_like(self.pressure) for _ in range(3))
-        self._slope: Float = np.zeros_like(self.pressure)
+        lifted = np.minimum(borne + lines.margin, self._rated)
+        self.pressure: Float = np.where(self._open, lines.outlet + lines.drop, lifted)
+        self.taken, self._slope = np.zeros_like(self.pressure), np.zeros_like(self.pressure)
+        self.flow: Float = np.where(self._open, lines.most(self.pressure), 0.0)
+        self.relieved: Float = self._returns(self.pressure)[0]
         self.start()
 
     def start(self) -> None:
         """Reset the time, and how long the pumps were full."""
         self.time, self.full = 0.0, np.zeros_like(self.pressure)
         self.first, self.lowest = np.full_like(self.pressure, np.nan), np.full_like(self.pressure, np.inf)
+        self.given, self.wasted = np.zeros_like(self.pressure), np.zeros_like(self.pressure)
 
     def at_valves(self, pressure: Float, other: Float) -> Float:
         """Pressures (N, L) of the lines at their actuators (N, k), and `other` (N, k) where none is declared."""
@@ -123,21 +143,31 @@ class Supplies:
 
     def _relieves(self, pressure: Float) -> tuple[Float, Float]:
         """Relief's flow and slope (N, L)."""
-        over = pressure - 1.1 * self._rated
+        over = pressure - self._opens
         return self._relief * np.maximum(over, 0.0), np.where(over > 0.0, self._relief, 0.0)
+
+    def _returns(self, pressure: Float) -> tuple[Float, Float]:
+        """q_R and its slope (N, L) at the spools' present positions."""
+        relief, slope = self._relieves(pressure)
+        if not self._open.any():
+            return relief, slope
+        closed = np.where(self.lines.feeds > 0.0, narrowed(self._y[2][:, None], self.lines.shut[:, None]), 0.0)
+        through, more = bypass(self._centre, (closed * self._share).sum(axis=-1), pressure - self.lines.outlet)
+        return relief + through, slope + more
 
     def _wanted(self, taken: Float, pressure: Float) -> Float:
         """Q_w (N, L) within the pump's limits."""
+        most = self.lines.most(pressure)
         spool, pressure_a, pressure_b = self._y[2:]  # of the chambers that open valves feed, 0 with all shut
         felt = np.where(np.abs(spool) - self._deadband > OPEN, np.where(spool > 0.0, pressure_a, pressure_b), 0.0)
         largest: Float = np.max(felt[:, None] * self.lines.feeds, axis=-1)
         target = np.minimum(largest + self.lines.margin, self._rated)
         gain = 0.5 * self.lines.softness / self.lines.response
-        return np.clip(taken + gain * (target - pressure), 0.0, self.lines.most(pressure))
+        return np.where(self._open, most, np.clip(taken + gain * (target - pressure), 0.0, most))
 
     def begin(self, *, lost: bool = False) -> None:
         """Predict the pressures and set the actuators' inputs, of which `lost` says that they hold a fault's loss."""
-        p, (relieved, more) = self.pressure, self._relieves(self.pressure)
+        p, (relieved, more) = self.pressure, self._returns(self.pressure)
         self._asked = self._wanted(self.taken, p)
         given = self.flow + 0.5 * self._lag * (self._asked - self.flow)  # mean of the step
         self._there: Float = p + self._stiff * (given - self.taken - relieved) / (
@@ -154,14 +184,16 @@ class Supplies:
         taken_there = taken + slope * (there - middle)
         asked = 0.5 * (self._asked + self._wanted(taken_there, there))
         flow = np.clip(self.flow + self._lag * (asked - self.flow), 0.0, lines.most(there))
-        relieved, more = self._relieves(there)
+        relieved, more = self._returns(there)
         left = 0.5 * (self.flow + flow - self.taken - taken_there - self.relieved - relieved)
         missing = self.pressure + self._stiff * left - there
         self.pressure = there + missing / (1.0 + self._stiff * (slope + more))
         self.taken, self._slope, self.flow = taken + slope * (self.pressure - middle), slope, flow
-        self.relieved = self._relieves(self.pressure)[0]
+        self.relieved = self._returns(self.pressure)[0]
         self.time += self.dt
-        full = flow >= 0.98 * lines.most(self.pressure)  # counts as full
+        self.given += self.dt * self.pressure * flow
+        self.wasted += self.dt * self.pressure * self.relieved
+        full = np.where(self._open, self.taken, flow) >= 0.98 * lines.most(self.pressure)  # counts as full
         self.full += self.dt * full
         self.first = np.where(full & np.isnan(self.first), self.time, self.first)
         self.lowest = np.where(full, np.minimum(self.lowest, self.pressure), self.lowest)
@@ -173,6 +205,15 @@ class Supplies:
             f" {self.first[trial, i]:.3f} s, and its line fell to {self.lowest[trial, i] / 1e5:.0f} bar"
             for i, name in enumerate(self.lines.names)
             if self.full[trial, i] > 0.0
+        ]
+
+    def waste(self, trial: int) -> list[str]:
+        """A sentence for each pump of open centres: what of its energy since `start` moved nothing."""
+        return [
+            f"supply {name}: {self.wasted[trial, i] / 1e3:.3g} kJ of its pump's {self.given[trial, i] / 1e3:.3g} kJ"
+            " went to the return line through open centres and relief"
+            for i, name in enumerate(self.lines.names)
+            if self._open[i]
         ]
 
 

@@ -40,6 +40,7 @@ from skillframe_hydraulics.force.valve import ValveIdentification
 from skillframe_hydraulics.law.generated import Batch
 from skillframe_hydraulics.law.hydraulic import Measured, Reference, Terms
 from skillframe_hydraulics.law.hydraulic_compiled import CompiledLaw
+from skillframe_hydraulics.law.line_ahead import open_centres
 from skillframe_hydraulics.law.vdc_actuator import Cylinders
 from skillframe_hydraulics.oil_balance import BOUNDS, Knowledge, balance_function
 from skillframe_hydraulics.sensors import RECENT, MachineSensors
@@ -62,12 +63,13 @@ class ReadingWatch:
 
     def __init__(
         self, noise: MachineNoise, speed: Float, returns: Float, moved: NDArray[np.int64],
-        names: tuple[tuple[str, ...], tuple[str, ...]], dt: float,
+        names: tuple[tuple[str, ...], tuple[str, ...]], dt: float, open_centre: bool = False,
     ) -> None:  # fmt: skip
         self._n, n, k = len(speed), len(speed), len(returns)
         self._names = [*names[0], *(f"pressure_{side} of {name}" for side in "ab" for name in names[1])]
         self._jump: Float = speed * dt + BOUNDS.sure * np.sqrt(2.0) * noise.encoder
-        self._lowest: Float = np.tile(np.maximum(returns - BOUNDS.sunken, BOUNDS.vacuum), 2)
+        sunken = BOUNDS.emptied if open_centre else BOUNDS.sunken
+        self._lowest: Float = np.tile(np.maximum(returns - sunken, BOUNDS.vacuum), 2)
         self._returns: Float = np.tile(returns, 2)
         self._quiet = np.repeat([noise.encoder == 0.0, noise.pressure == 0.0], [n, 2 * k])
         first = np.array([np.argmax(moved == joint) for joint in range(n)])
@@ -116,10 +118,17 @@ class FlowWatch:
     Args:
         cylinders: nominal cylinders; names: of them. count: N; period: [s] between two checks.
         noise: standard deviation of an encoder's filtered reading [rad or m].
+        open_centre: whether a pump is of open centres, see `balance_function`.
     """
 
     def __init__(
-        self, cylinders: Cylinders, names: tuple[str, ...], count: int, period: float, noise: float = 0.0
+        self,
+        cylinders: Cylinders,
+        names: tuple[str, ...],
+        count: int,
+        period: float,
+        noise: float = 0.0,
+        open_centre: bool = False,
     ) -> None:
         self._names, self._period, k = names, period, len(names)
         self._area: Float = np.stack([cylinders.area_a, cylinders.area_b])[:, None]
@@ -128,21 +137,20 @@ class FlowWatch:
         """Cumulative sums of (2) into both chambers, latest first: sizes, both ends, and ends for likely overlaps."""
         self._seen: Float = np.zeros((count, self._length, 3, k))
         """Pistons and both pressures, latest first."""
-        self._given = [np.zeros((count, k)) for _ in range(12)]
+        self._given = [np.zeros((count, 2 * k if open_centre and i == 0 else k)) for i in range(12)]
         self._taken, self._squeezed = (np.zeros((count, 2, k)) for _ in range(2))
         self._explained, self._everyone = np.zeros((count, 2)), np.arange(count)
         inputs = [*self._given, self._told, self._seen]
         after = [np.zeros_like(self._told), np.zeros_like(self._seen)]
-        self._balance = Batch(
-            balance_function(cylinders, period), inputs, [*after, self._taken, self._squeezed, self._explained],
-            carried={0: len(inputs) - 2, 1: len(inputs) - 1},
-        )  # fmt: skip
+        outputs = [*after, self._taken, self._squeezed, self._explained]
+        carried = {0: len(inputs) - 2, 1: len(inputs) - 1}
+        self._balance = Batch(balance_function(cylinders, period, open_centre), inputs, outputs, carried=carried)
         self._looks, self._running = 0, 0
         self._vague: NDArray[np.int64] = np.zeros((count, len(names)), dtype=np.int64)
         """Checks (N, k) for which the valve flow remains unknown."""
 
     def look(self, valve: Float, seen: Measured, terms: Terms, knowledge: Knowledge, swing: bool) -> list[Suspicion]:
-        """Check the balances, with the mean command `valve` (N, k) since the last check."""
+        """Check the balances, with the mean command `valve` since the last check, as of `balance_function`."""
         blur = self._blur * np.sqrt(dot(terms.arms, terms.arms))
         floor = BOUNDS.floor_in_swing if swing else BOUNDS.floor
         given = (valve, *seen[2:4], terms.piston, *knowledge, floor, BOUNDS.spool_floor + blur)
@@ -258,19 +266,20 @@ class MachineWatch:
     ) -> None:  # fmt: skip
         chain, period, count = law.chain, RECENT * dt, gauges.raw.shape[1]
         self._law, self._valves, self._gauges, self._tick = law, valves, gauges, 0
+        self._open_centre = open_centres(chain.robot.spec) is not None
         speed = chain.minimal(chain.model.velocityLimit)
         names = (tuple(chain.independent), tuple(chain.actuated))
-        self._readings = ReadingWatch(noise, speed, cylinders.return_pressure, moved, names, dt)
+        self._readings = ReadingWatch(noise, speed, cylinders.return_pressure, moved, names, dt, self._open_centre)
         # white noise behind w^2 / (s + w)^2 has a variance w dt / 4 times as large
         filtered = noise.encoder * float(np.sqrt(0.5 * np.pi * noise.corner_hz * dt))
-        self._flow = FlowWatch(cylinders, names[1], count, period, filtered)
+        self._flow = FlowWatch(cylinders, names[1], count, period, filtered, self._open_centre)
         self._tool = ToolWatch(count, period, law.at.tip.shape[1])
-        self._told: Float = np.zeros((count, len(names[1])))
+        self._told: Float = np.zeros((count, (2 if self._open_centre else 1) * len(names[1])))
         self._known, self._swinging = knowledge(law, valves), True
 
     def due(self, valve: Float) -> bool:
         """Add the command (N, k) of a tick. Returns whether a full check is due."""
-        self._told += valve
+        self._told += np.hstack([np.maximum(valve, 0.0), np.minimum(valve, 0.0)]) if self._open_centre else valve
         self._tick += 1
         return self._tick % RECENT == 0
 

@@ -18,6 +18,7 @@ from skillframe.robot import ClosedChain, published_inertia
 from skillframe.signals import rate_after
 from skillframe_hydraulics.counterbalance import counterbalances
 from skillframe_hydraulics.law.generated import dense_function, matrix_symbol
+from skillframe_hydraulics.law.line_ahead import inverse_ahead, open_centres
 from skillframe_hydraulics.law.symbolic_chain import Expression, SymbolicChain, closing_function, constant
 from skillframe_hydraulics.law.vdc_actuator import (
     CYLINDER,
@@ -46,6 +47,7 @@ def functions(chain: ClosedChain, axes: Float) -> tuple[ca.Function, ca.Function
     key = (
         chain.model.saveToString(), chain.robot.tool_frames[0], chain.steered, *(each.tobytes() for each in chosen),
         chain.loops, repr(counterbalances(chain.robot.spec.actuation)),
+        *(each.tobytes() for each in (open_centres(chain.robot.spec) or ((),))[1:]),
         published_inertia(chain.robot.spec).com if chain.robot.spec.payload else None,
     )  # fmt: skip
     if key not in _KEPT:
@@ -148,7 +150,11 @@ def law_function(chain: ClosedChain, axes: Float) -> ca.Function:
     value, slope = rate_after(value, slope, f_pr, 2.0 * np.pi * gain["corner"], gain["dt"])
     gains = CylinderGains(velocity=k_x, force=k_f)
     demand = flow_demand(c, gains, (piston, speed, speed_r), (f_pr, slope), (p_a, p_b))
-    opened = inverse_valve(c, demand, piston, (p_a, p_b), supply)
+    lines = open_centres(chain.robot.spec)
+    if lines is None:
+        opened = inverse_valve(c, demand, piston, (p_a, p_b), supply)
+    else:
+        opened = inverse_ahead(lines, c, (demand, piston, speed, speed_r), (p_a, p_b), supply, deadband)
     valve = clip(across_deadband(deadband, opened), -1.0, 1.0)
     lower, upper = (b[1] for b in bounds)
     learned = adapt(rows, gain["adaptation"] * ca.horzcat(*drive).T, (lower, upper), gain["dt"])

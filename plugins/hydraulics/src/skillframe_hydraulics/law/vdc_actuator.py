@@ -25,7 +25,7 @@ and the machine would oscillate. f_0 is small, so that the two do not alternate 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -181,12 +181,28 @@ def flow_demand(c: Any, gains: Any, motion: tuple[Any, ...], force: tuple[Any, .
     return feedback + rate / c.bulk_modulus + (c.area_a * a + c.area_b * b) * xd + leak
 
 
-def inverse_valve(c: Any, demand: Any, x: Any, pressures: tuple[Any, ...], supply: Any = None) -> Any:
-    """Unlimited opening u_e (..., n) of the edges for the flow demand, at the supply p_S or the nominal one."""
+def least_root(c: Any, drop: Any) -> Any:
+    """Root of a drop of at least `laminar_pressure` [sqrt(Pa)]."""
+    return sqrt(maximum(drop, c.laminar_pressure))
+
+
+def inverse_valve(
+    c: Any,
+    demand: Any,
+    x: Any,
+    pressures: tuple[Any, ...],
+    supply: Any = None,
+    root: Callable[..., Any] = least_root,
+    out: Callable[..., Any] = least_root,
+) -> Any:
+    """Unlimited opening u_e (..., n) of the edges for the flow demand, at the supply p_S or the nominal one.
+
+    `root` and `out` are those of the drops from the supply and to the return line, of `c` and drops.
+    """
     (p_a, p_b), high = pressures, c.supply_pressure if supply is None else supply
     a, b = (1.0 / length for length in chamber_lengths(c, x))
-    into_a, out_b = c.edge_pa * sqrt(_drop(c, high - p_a)) * a, c.edge_bt * sqrt(_drop(c, p_b - c.return_pressure)) * b
-    into_b, out_a = c.edge_pb * sqrt(_drop(c, high - p_b)) * b, c.edge_at * sqrt(_drop(c, p_a - c.return_pressure)) * a
+    into_a, out_b = c.edge_pa * root(c, high - p_a) * a, c.edge_bt * out(c, p_b - c.return_pressure) * b
+    into_b, out_a = c.edge_pb * root(c, high - p_b) * b, c.edge_at * out(c, p_a - c.return_pressure) * a
     opened = demand / (c.edge * where(demand > 0.0, into_a + out_b, into_b + out_a))
     if c.counterbalance is None:
         return opened
@@ -203,7 +219,3 @@ def inverse_valve(c: Any, demand: Any, x: Any, pressures: tuple[Any, ...], suppl
 def across_deadband(deadband: Any, opening: Any) -> Any:
     """Command u (..., n) for an opening u_e of a valve with overlap b."""
     return (1.0 - deadband) * opening + deadband * tanh(opening / ACROSS)
-
-
-def _drop(c: Any, drop: Any) -> Any:
-    return maximum(drop, c.laminar_pressure)
