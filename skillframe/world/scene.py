@@ -246,6 +246,7 @@ class Scene:
         analytic: closed-form figures for the report.
         params: the parameters it was built from.
         places: named poses in the fixture frame for skills: position and quaternion.
+        reached: points in the fixture frame that the tip has to reach, by which a machine's `[workspace]` is checked.
 
     Raises:
         InputError, UnknownName: a geom cannot collide as drawn, or is of unknown kind.
@@ -267,6 +268,7 @@ class Scene:
     analytic: dict[str, float] = field(default_factory=dict)
     params: dict[str, Any] = field(default_factory=dict)
     places: dict[str, tuple[Vector, tuple[float, float, float, float]]] = field(default_factory=dict)
+    reached: tuple[Vector, ...] = ()
 
     def __post_init__(self) -> None:
         groups = {"fixture": self.fixture, "tool": self.tool.geoms}

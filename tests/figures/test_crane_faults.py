@@ -1,4 +1,4 @@
-"""Every fault of the crane, in every cylinder, at ten times, twenty runs each; and cranes without a fault."""
+"""Every fault of the crane, in every cylinder, at ten times, twenty runs each; cranes without a fault; an excavator."""
 
 from __future__ import annotations
 
@@ -8,7 +8,18 @@ import numpy as np
 import pytest
 from skillframe_papers.rows import crane_runs
 
-from tests.figures.crane_faults import DEPTH, KINDS, LIMIT, Struck, conditions, fine, struck, verdict
+from tests.figures.crane_faults import (
+    DEPTH,
+    KINDS,
+    LIMIT,
+    Struck,
+    at_random,
+    conditions,
+    excavator,
+    fine,
+    struck,
+    verdict,
+)
 from tests.figures.teaching import row
 from tests.fmu_cache import own_cache  # noqa: F401
 
@@ -17,6 +28,8 @@ TIMES = (-6.0, -4.1, -2.003, 0.3, 1.2, 2.507, 3.9, 5.2, 6.35, 7.4)
 """In the swing, on the way down, at the touch, pressing, and sliding; some between two looks of the watch."""
 RUNS = 20
 SOUND, PRESSED_S = 60, 14.0
+DRAWN = 1000
+"""Of the excavator, 16 s of simulation each unless a fault ends them before."""
 
 
 def show(trials: list[Struck]) -> None:
@@ -34,6 +47,15 @@ def test_a_fault_ends_its_trial_within_a_fifth_of_a_second_by_its_own_reason_or_
     for one in trials:
         assert fine(one), one
         assert not (one.success and one.force > LIMIT), one
+
+
+def test_faults_of_an_excavator_at_any_time_end_by_their_own_reason_or_stay_within_limits():
+    """With a slew, twin cylinders and a bucket linkage. Trials that ring in the swing end before anything breaks."""
+    trials = list(at_random(excavator(), DRAWN, seed=4200))
+    for kind in KINDS:
+        show([one for one in trials if one.kind == kind])
+    for one in trials:
+        assert fine(one), one
 
 
 def left_alone(seed: int, depth: float, oil: tuple[float, float]) -> None:

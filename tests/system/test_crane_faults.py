@@ -12,7 +12,7 @@ from skillframe.cli.main import run
 from skillframe.fmu.build import find_compiler
 from skillframe.robot.model import load_model
 from skillframe.robot.spec import load_robot
-from tests.figures.crane_faults import KINDS, LIMIT, Struck, fine, own_reason, together, verdict
+from tests.figures.crane_faults import KINDS, LIMIT, Struck, crane, fine, own_reason, together, verdict
 from tests.fmu_cache import own_cache  # noqa: F401
 
 pytestmark = [
@@ -57,7 +57,7 @@ def test_the_rule_is_its_own_reason_within_a_fifth_of_a_second_or_limits_that_ho
         ("true_force", 0.1, 0.9 * LIMIT, "true force limit: 15001 N", "neither"),
     ]
     for ended, after, force, reason, expected in cases:
-        one = Struck("stuck", "lift", 1.2, after, force, ended, False, reason)
+        one = Struck("stuck", "lift_piston", "lift", 1.2, after, force, LIMIT, ended, False, reason)
         assert verdict(one) == expected, one
         assert fine(one) == (expected != "neither")
 
@@ -65,8 +65,8 @@ def test_the_rule_is_its_own_reason_within_a_fifth_of_a_second_or_limits_that_ho
 def test_without_a_watch_a_burst_hose_drops_the_tool_on_the_plate():
     """What the watch is worth: 0.2 s of fall would be 5 kN and more; this one hits with all it has."""
     spec = load_robot("hiab_xs031")
-    blind = load_model(with_noise(spec, dataclasses.replace(noise_of(spec), watch=False)))
-    (one,) = together([("burst a", 0, 0.5)], seed=4, seconds=1.5, robot=blind)
+    blind = crane()._replace(robot=load_model(with_noise(spec, dataclasses.replace(noise_of(spec), watch=False))))
+    (one,) = together([("burst a", 0, 0.5)], seed=4, seconds=1.5, machine=blind)
     assert one.ended in ("force", "true_force") and one.force > 3.0 * LIMIT
     assert not one.success
 

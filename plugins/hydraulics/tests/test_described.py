@@ -6,7 +6,10 @@ import re
 
 import numpy as np
 import pytest
+from skillframe_hydraulics.faults import moved_joints
 from skillframe_hydraulics.law.symbolic_chain import closing_function
+from skillframe_hydraulics.law.vdc_actuator import cylinders
+from skillframe_hydraulics.watch import valve_speeds
 
 from skillframe.errors import SkillframeError
 from skillframe.extend.drives import audit
@@ -206,6 +209,15 @@ def test_a_hinge_out_of_the_plane_and_a_name_that_is_taken_are_named(changed):
     taken = f'<link name="teeth"/>{taken}<child link="boom_left_barrel"/></joint>'
     with pytest.raises(SkillframeError, match="the URDF has a link 'boom_left_barrel' already"):
         load_model(load_robot(changed(urdf=[('<link name="teeth"/>', taken)])))
+
+
+def test_a_slew_whose_urdf_gives_no_speed_is_as_fast_as_its_valve_lets_it(chain):
+    """300 l/min at 20 bar are 5e-3 sqrt(395 / 20) m3/s at 400 bar of relief and 5 of the return line, over D."""
+    known, moved = cylinders(chain.robot.spec.actuation), moved_joints(chain)
+    assert math.isinf(chain.minimal(chain.model.velocityLimit)[0])
+    speeds = valve_speeds(chain, known, moved)
+    assert speeds[0] == pytest.approx(5e-3 * math.sqrt(395.0 / 20.0) / (180e-6 * 270.0 / (2.0 * math.pi)), rel=1e-9)
+    assert 2.0 < speeds[0] < 4.0 and np.all(speeds[1:] > 3.0)  # a boom whose arm may fall to 0.1 m is not slower
 
 
 def test_a_strut_says_what_it_is_without_a_plugin(chain):

@@ -27,6 +27,7 @@ from skillframe.world import Draws, Plant, Scene, fixture_poses, start_poses
 from skillframe_hydraulics.checks.feasibility import areas, require_feasible, require_held
 from skillframe_hydraulics.checks.figures import CYLINDER
 from skillframe_hydraulics.checks.pumps import swing_part, unfit_pumps
+from skillframe_hydraulics.checks.start import require_start
 from skillframe_hydraulics.columns import EnergyBill, columns
 from skillframe_hydraulics.cylinder.bank import banks, foreign_specs, instance_parameters
 from skillframe_hydraulics.declared import fast_filters, gains_of, noise_of, supplies_of
@@ -55,7 +56,7 @@ class MachineDrive:
     """N hydraulic machines in lock-step.
 
     Raises:
-        InputError: the machine cannot stand at a start, or its pumps are too small for the swing.
+        InputError: the machine cannot stand at a start or swing there, or its pumps are too small for the swing.
         StepTooLarge: the control rate is too low for the load on a cylinder.
         UnknownName, SkillframeError: as `skillframe.execution.executor.simulate`.
     """
@@ -69,6 +70,8 @@ class MachineDrive:
         self._swing_part = swing_part(self.chain, self.task)
         for slip in unfit_pumps(self.chain, self.task):
             raise InputError(f"robot {spec.name}", slip.problem, slip.fix)
+        first = start_poses(robot, setup.scene, draws, self.count).position[0]
+        require_start(self.chain, self.task, setup.scene, first, self._swing_part)
         fixture = fixture_poses(robot, draws, self.count)
         self.plant = Plant(robot, setup.scene, self.count, fixture, draws, timestep=self.dt)
         self.plant.reset(closed_configurations(self.chain, self.task, setup.scene, draws, self.count))

@@ -27,7 +27,7 @@ class Bounds:
         window: checks per balance; lags: in checks, 20 to 60 ms, of which the shipped crane needs 20.
         floor, floor_in_swing: tolerated motion of the piston [m]; share: of the flow.
         unsure: standard deviation or last change of a supply pressure above which a valve may pass from zero up to (2),
-            because early fits can be wrong by 16 bar with a small standard deviation [Pa].
+            at the highest likely pressure, because early fits can be wrong by 16 bar with a small deviation [Pa].
         alike: share of another motion below which one is negligible.
         spread: standard deviations of supply and overlap.
         setting: by which a counterbalance valve may open late or early [Pa].
@@ -101,12 +101,14 @@ def balance_function(c: Cylinders, period: float, open_centre: bool = False) -> 
     swung = Knowledge(*known)
     sure = swung.unsure <= BOUNDS.unsure
     supply = ca.if_else(sure, swung.supply, maximum(swung.supply, c.supply_pressure))
-    spread = ca.if_else(sure, BOUNDS.spread * swung.unsure, 0.0)
+    above = BOUNDS.spread * swung.unsure  # a supply above the declared one, until the swing has found it
+    below = ca.if_else(sure, above, 0.0)
     check_a = check_b = c.feed_check
     if own := c.counterbalance:
         check_a, check_b = np.maximum(check_a, own.holds_a), np.maximum(check_b, own.holds_b)
     checks = check_a, check_b
-    halves = [_volumes(c, period, part, (p_a, p_b), (supply, spread), swung, checks) for part in ca.vertsplit(valve, k)]
+    lines = supply - below, supply + above
+    halves = [_volumes(c, period, part, (p_a, p_b), lines, swung, checks) for part in ca.vertsplit(valve, k)]
     volumes = halves[0] if not open_centre else [one + other for one, other in zip(*halves, strict=True)]
     if open_centre:
         for i, pressure in ((2, p_a), (3, p_b), (6, p_a), (7, p_b)):  # the upper ends
@@ -133,12 +135,12 @@ def _volumes(
 ) -> list[ca.SX]:  # fmt: skip
     """Lower and upper ends of (2) into both chambers, and both ends for the likely overlaps.
 
-    `lines` are the supply and its spread [Pa].
+    `lines` are the lowest and the highest likely pressure of the supply [Pa].
     """
-    (p_a, p_b), (supply, spread) = pressures, lines
+    p_a, p_b = pressures
     ends = {
         laminar: [
-            _edge(c, pressure, fills, supply - spread if laminar else supply + spread, laminar, shares)
+            _edge(c, pressure, fills, lines[0] if laminar else lines[1], laminar, shares)
             for pressure, fills, shares in (
                 (p_a, valve > 0.0, (c.edge_pa, c.edge_at, checks[0])),
                 (p_b, valve <= 0.0, (c.edge_pb, c.edge_bt, checks[1])),

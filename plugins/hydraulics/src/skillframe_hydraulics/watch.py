@@ -2,8 +2,9 @@ r"""Fault detection of a hydraulic machine every 20 ms: impossible readings, oil
 
 **Readings.** An exactly repeated value, a jump of a joint, or a pressure below the return line's. With white noise a
 few equal readings mean a stopped sensor; without noise only while the piston moves. A joint moves at most v dt between
-readings, at its velocity limit v, plus a multiple of the noise sqrt(2) sigma of two readings. Check valves hold a
-chamber at the return line's pressure; far below it, or below vacuum, hose or transducer has failed.
+readings, at its velocity limit v, plus a multiple of the noise sqrt(2) sigma of two readings. Without a limit v is what
+its valve lets through (`valve_speeds`). Check valves hold a chamber at the return line's pressure; far below it, or
+below vacuum, hose or transducer has failed.
 
 **Oil.** Volume taken by a chamber against flow through its valve:
 
@@ -34,7 +35,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skillframe.frames import Float, dot, norm
+from skillframe.robot import ClosedChain
 from skillframe.skill import Broken, Ended
+from skillframe_hydraulics.checks.feasibility import LEAST_ARM
+from skillframe_hydraulics.checks.figures import relief
 from skillframe_hydraulics.declared import MachineNoise
 from skillframe_hydraulics.force.valve import ValveIdentification
 from skillframe_hydraulics.law.generated import Batch
@@ -52,6 +56,23 @@ class Suspicion(NamedTuple):
     row: int
     sensor: bool
     text: str
+
+
+def valve_speeds(chain: ClosedChain, cylinders: Cylinders, moved: NDArray[np.int64]) -> Float:
+    r"""Largest speed (n,) of every coordinate by its actuators' valves, infinite if nothing limits it [rad/s, m/s].
+
+    The widest edge c passes c sqrt(p - p_R) at the port relief's p, past the smaller area A. A coordinate that an
+    actuator turns through a moment arm R >= `LEAST_ARM`, or a sixth of its stroke, moves at v / R.
+    """
+    c, most = cylinders, np.full(len(chain.independent), np.inf)
+    widest: Float = np.max([c.edge_pa, c.edge_pb, c.edge_at, c.edge_bt], axis=0) * c.edge
+    opens = np.array([relief(one) for one in chain.robot.spec.actuation])
+    rate = widest * np.sqrt(np.maximum(opens, c.supply_pressure) - c.return_pressure) / np.minimum(c.area_a, c.area_b)
+    arm = np.minimum(LEAST_ARM, c.stroke / 6.0)
+    direct = np.array([name in chain.independent for name in chain.actuated])
+    with np.errstate(divide="ignore"):  # a motor in a linkage, whose lever is unknown
+        np.minimum.at(most, moved, rate / np.where(direct, 1.0, arm))
+    return most
 
 
 class ReadingWatch:
@@ -268,6 +289,7 @@ class MachineWatch:
         self._law, self._valves, self._gauges, self._tick = law, valves, gauges, 0
         self._open_centre = open_centres(chain.robot.spec) is not None
         speed = chain.minimal(chain.model.velocityLimit)
+        speed = np.where(np.isfinite(speed), speed, valve_speeds(chain, cylinders, moved))
         names = (tuple(chain.independent), tuple(chain.actuated))
         self._readings = ReadingWatch(noise, speed, cylinders.return_pressure, moved, names, dt, self._open_centre)
         # white noise behind w^2 / (s + w)^2 has a variance w dt / 4 times as large

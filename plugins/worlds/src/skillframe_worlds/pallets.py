@@ -111,6 +111,7 @@ def build(params: PalletsParams) -> Scene:
             direction=(float(np.sqrt(0.5)), 0.0, -float(np.sqrt(0.5))), hand="sliding", starts=(over_stack, by_stop),
             done=sunk_in,
         ),
+        reached=((float(corner[0]), 0.0, float(corner[2])),),
     )  # fmt: skip
 
 
