@@ -1,6 +1,7 @@
 """All of AutoMate's assemblies in one table: `python -m tests.figures.assemblies FOLDER...`.
 
-FOLDER is filled by `skillframe benchmark automate`. Assemblies that do not run count as not seated. A run that ends as
+FOLDER is filled by `skillframe benchmark automate`; of an assembly in several, the last counts. Assemblies that do not
+run count as not seated. A run that ends as
 seated predicts success with the share of such runs that are; Brier's score compares it with what happened.
 """
 
@@ -33,18 +34,17 @@ class Trial(NamedTuple):
     why: str
 
 
-def trials(folder: Path) -> Iterator[Trial]:
-    """The trials of all assemblies of a folder."""
-    for place in sorted(done.parent for done in folder.glob(f"*/{DONE}")):
-        if not (place / TRIALS).exists():
-            continue
-        plan, parts = (json.loads((place / name).read_text()) for name in (DONE, "parts.json"))
-        for level, rows in by_level(place / TRIALS, plan["levels"], plan["trials"]).items():
-            for row in rows:
-                seated = bool(row["success"])
-                claims = seated or CLAIM in row["failure"]
-                why = "" if seated else _why(row, parts["depth_m"])
-                yield Trial(place.name, level, row["skill"].removesuffix(".skill.json"), seated, claims, why)
+def trials(place: Path) -> Iterator[Trial]:
+    """The trials of an assembly."""
+    if not (place / TRIALS).exists():
+        return
+    plan, parts = (json.loads((place / name).read_text()) for name in (DONE, "parts.json"))
+    for level, rows in by_level(place / TRIALS, plan["levels"], plan["trials"]).items():
+        for row in rows:
+            seated = bool(row["success"])
+            claims = seated or CLAIM in row["failure"]
+            why = "" if seated else _why(row, parts["depth_m"])
+            yield Trial(place.name, level, row["skill"].removesuffix(".skill.json"), seated, claims, why)
 
 
 def _why(row: dict[str, Any], depth: float) -> str:
@@ -86,6 +86,5 @@ def _brier(mine: list[Trial], by_claim: bool = True) -> float:
 
 
 if __name__ == "__main__":
-    folders = [Path(each) for each in sys.argv[1:]]
-    done = {done.parent.name for folder in folders for done in folder.glob(f"*/{DONE}")}
-    print("\n".join(shown([one for folder in folders for one in trials(folder)], len(done))))
+    places = {done.parent.name: done.parent for each in sys.argv[1:] for done in sorted(Path(each).glob(f"*/{DONE}"))}
+    print("\n".join(shown([one for place in places.values() for one in trials(place)], len(places))))
