@@ -20,7 +20,7 @@ from skillframe_hydraulics.checks.figures import (
     unfit_machine,
 )
 from skillframe_hydraulics.checks.pumps import unfit_pumps
-from skillframe_hydraulics.checks.working_range import far_fixture, working_figures
+from skillframe_hydraulics.checks.working_range import working_figures
 from skillframe_hydraulics.cylinder.bank import foreign_specs
 from skillframe_hydraulics.declared import fast_filters, gains_of, noise_of, require_declared
 from skillframe_hydraulics.law.hydraulic import tool_task
@@ -61,16 +61,15 @@ def machine_warnings(robot: RobotModel) -> Iterator[Problem]:
     try:
         chain = ClosedChain(robot)
         z = chain.minimal(chain.home)
-        unfit, small, strained, low, far = (
+        unfit, small, strained, low = (
             [] if slips else problems(chain, z),
             list[Unfit](),
             list[str](),
             list[str](),
-            "",
         )
         if not unfit:
-            small = list(unfit_pumps(chain, task := tool_task(chain)))
-            strained, far = list(strained_actuators(chain, z)), far_fixture(chain, task)
+            small = list(unfit_pumps(chain, tool_task(chain)))
+            strained = list(strained_actuators(chain, z))
             low = list(low_settings(chain, z))
     except SkillframeError as error:
         text, fix = (error.problem, error.fix) if isinstance(error, InputError) else (str(error), "correct robot.toml")
@@ -87,8 +86,6 @@ def machine_warnings(robot: RobotModel) -> Iterator[Problem]:
         yield warning("little_force_left", text, "a larger bore, more supply_pressure, less load, or another [home]")
     for text in low:
         yield warning("low_setting", text, "correct setting or port under counterbalance of its [[cylinder]]")
-    if far:
-        yield warning("far_fixture", far, "write another fixture under [workspace], within the working range")
     for text in unfit:
         yield warning("impossible_home", f"at home {text}", "choose another [home]")
     given, default = spec.limits, Limits()

@@ -19,8 +19,7 @@ from scipy.optimize import linprog
 from skillframe.errors import InputError
 from skillframe.frames import Float, norm
 from skillframe.robot import ChainState, ClosedChain, OutOfReach
-from skillframe_hydraulics.checks.feasibility import capacity, problems
-from skillframe_hydraulics.law.vdc_reference import ToolTask
+from skillframe_hydraulics.checks.feasibility import capacity
 
 LEAST_STEP = 2e-3  # rad or m: a reach of 10 m is then found to millimetres
 OVER = 1e-3  # m or rad that a joint may pass its limit by, as rods move along curves
@@ -88,18 +87,6 @@ def largest_forces(chain: ClosedChain) -> dict[str, float]:
             if solved.status == 0:
                 found[name] = float(solved.x[-1])
     return found
-
-
-def far_fixture(chain: ClosedChain, task: ToolTask) -> str:
-    """A sentence if the tool does not reach the fixture of `[workspace]`, else ""."""
-    fixture, home = np.asarray(chain.robot.spec.workspace.fixture, dtype=float), chain.minimal(chain.home)
-    try:
-        z = task.solve(chain, np.concatenate([task.axes @ fixture, home[len(task.axes) :]]), home)
-        found = problems(chain, chain.settled(z))
-    except InputError:
-        found = ["its joints do not stretch or fold so far"]
-    place = ", ".join(f"{x:.4g}" for x in fixture)
-    return f"the tool does not reach the fixture at ({place}) m: {'; '.join(found)}" if found else ""
 
 
 def _hung(chain: ClosedChain, frame: int) -> int:
