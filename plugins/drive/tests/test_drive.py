@@ -45,7 +45,7 @@ def two_links(monkeypatch):
 
 def cell(robot: str, **changes: object) -> Cell:
     return Cell(
-        robot=robot, link=f"direct_{LINKS[robot][0]}", host="", world="valley", **{"witness": "pose", **changes}
+        robot=robot, link=f"direct_{LINKS[robot][0]}", host="", **{"world": "valley", "witness": "pose", **changes}
     )
 
 

@@ -131,7 +131,7 @@ def test_no_parameter_is_set_before_the_pose_that_holds_is_the_target(nodes, lin
     link.read()
     monkeypatch.setattr(link, "_publish", lambda *target: None)
     link.send(spring(nodes))
-    assert link.fault == "the first target was not published within 100 ms" and nodes.values == {}
+    assert link.fault == "the first target was not published within 3 s" and nodes.values == {}
 
 
 @pytest.mark.parametrize(
