@@ -1,8 +1,8 @@
 """All of AutoMate's assemblies in one table: `python -m tests.figures.assemblies FOLDER...`.
 
 FOLDER is filled by `skillframe benchmark automate`; of an assembly in several, the last counts. Assemblies that do not
-run count as not seated. A run that ends as
-seated predicts success with the share of such runs that are; Brier's score compares it with what happened.
+run count as not seated. A run that ends as seated predicts success with the share of such runs that are; Brier's score
+compares it with what happened.
 """
 
 from __future__ import annotations

@@ -13,25 +13,27 @@ from plugins.hydraulics.tests.test_working_range import MACHINES, PUBLISHED, cha
 from skillframe.errors import InputError
 from skillframe.execution.prepare import load_world
 from skillframe.robot import ClosedChain, load_model, load_robot
-from skillframe.world import start_poses
+from skillframe.world import fixture_poses, start_poses
 
 __all__ = ["changed"]
 
 
-def refused(folder, **changes):
-    """What a run in `pallets`, of which `changes` are made, says of a start that it refuses, else ""."""
+def refused(folder, draws=None, **changes):
+    """What a run in `pallets`, of which `changes` are made, says of starts that it refuses, else ""."""
     chain = ClosedChain(load_model(load_robot(folder)))
     task, scene = tool_task(chain), dataclasses.replace(load_world("pallets", {}), **changes)
     try:
-        first = start_poses(chain.robot, scene, {}, 1).position[0]
-        require_start(chain, task, scene, first, swing_part(chain, task))
+        count = len(next(iter(draws.values()))) if draws else 1
+        starts = start_poses(chain.robot, scene, draws or {}, count).position
+        fixtures = fixture_poses(chain.robot, draws or {}, count)
+        require_start(chain, task, scene, starts, fixtures, swing_part(chain, task))
     except InputError as error:
         return str(error)
     return ""
 
 
 @pytest.mark.parametrize("name", PUBLISHED)
-def test_every_described_machine_can_press_into_the_corner_of_pallets_from_its_own_fixture(name):
+def test_every_described_machine_has_start_swing_and_goal_of_pallets_within_reach(name):
     assert refused(MACHINES / name) == ""
 
 
@@ -54,6 +56,16 @@ def test_a_start_that_is_refused_is_accepted_with_the_fixture_that_the_sentence_
     text = (folder / "robot.toml").read_text()
     (folder / "robot.toml").write_text(text.replace(f"fixture = {far}", f"fixture = {found}"))
     assert refused(folder) == ""
+
+
+def test_a_batch_is_refused_only_if_no_trial_of_it_can_begin_and_the_goal_moves_with_the_fixture():
+    folder = MACHINES / "jcb_535_95"
+    far, home = {"fixture.offset_x": np.array([9.0, 9.0])}, {"fixture.offset_x": np.array([9.0, 0.0])}
+    assert "cannot begin" in refused(folder, far) and refused(folder, home) == ""
+    nominal, moved = (
+        refused(folder, {"fixture.offset_x": np.array([by])}, reached=((20.0, 0.0, 0.5),)) for by in (0.0, -0.25)
+    )
+    assert "at its goal, [24.6, 0, 1] m" in nominal and "at its goal, [24.35, 0, 1] m" in moved
 
 
 def test_a_task_that_is_too_large_for_a_machine_says_so():

@@ -70,9 +70,9 @@ class MachineDrive:
         self._swing_part = swing_part(self.chain, self.task)
         for slip in unfit_pumps(self.chain, self.task):
             raise InputError(f"robot {spec.name}", slip.problem, slip.fix)
-        first = start_poses(robot, setup.scene, draws, self.count).position[0]
-        require_start(self.chain, self.task, setup.scene, first, self._swing_part)
         fixture = fixture_poses(robot, draws, self.count)
+        starts = start_poses(robot, setup.scene, draws, self.count).position
+        require_start(self.chain, self.task, setup.scene, starts, fixture, self._swing_part)
         self.plant = Plant(robot, setup.scene, self.count, fixture, draws, timestep=self.dt)
         self.plant.reset(closed_configurations(self.chain, self.task, setup.scene, draws, self.count))
         n, k = len(self.chain.independent), len(self.chain.actuated)

@@ -12,9 +12,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from skillframe.errors import InputError
-from skillframe.frames import Float, norm, rotate
+from skillframe.frames import Float, Pose, norm
 from skillframe.robot import ClosedChain
-from skillframe.world import Scene, nominal_fixture, start_poses
+from skillframe.world import Scene
 from skillframe_hydraulics.checks.feasibility import problems
 from skillframe_hydraulics.force.calibration import CALIBRATION_S, swing
 from skillframe_hydraulics.law.vdc_reference import ToolTask
@@ -44,16 +44,21 @@ def unfit_start(chain: ClosedChain, task: ToolTask, point: Float, part: float, g
     return ""
 
 
-def require_start(chain: ClosedChain, task: ToolTask, scene: Scene, point: Float, part: float) -> None:
-    """Refuse a start (3,) in base [m] of a scene at which `unfit_start` finds something.
+def require_start(
+    chain: ClosedChain, task: ToolTask, scene: Scene, starts: Float, fixtures: Pose, part: float
+) -> None:  # fmt: skip
+    """Refuse starts (N, 3) in base [m] at all of which, with fixtures (N,), `unfit_start` finds something.
 
     Raises:
-        InputError: with a fixture that puts start and goals within reach.
+        InputError: on the first, with a fixture that puts start and goals within reach.
     """
-    way = np.array(scene.reached).reshape(-1, 3) - np.array(scene.start_tip)
-    goals = start_poses(chain.robot, scene, {}, 1).position + rotate(nominal_fixture(chain.robot).rotation, way) - point
-    if not (text := unfit_start(chain, task, point, part, goals)):
-        return
+    reached, texts = np.array(scene.reached).reshape(-1, 3), list[str]()
+    for start, place, turn in zip(starts, fixtures.position, fixtures.rotation, strict=True):
+        texts.append(unfit_start(chain, task, start, part, place + reached @ turn.T - start))
+        if not texts[-1]:
+            return
+    point, text = starts[0], texts[0]
+    goals = fixtures.position[0] + reached @ fixtures.rotation[0].T - point
     spec = chain.robot.spec
     fix = "choose another machine, or place start and goal nearer to each other by the world's settings"
     for other in _starts(chain, task):

@@ -33,8 +33,7 @@ ROUNDS = 16
 """Of bisection: 0.01 bar."""
 STILL = 30.0
 """Least root of a drop to the return line [sqrt(Pa)]. A chamber that has run empty makes no force by draining, and the
-less it is believed to, the smaller is the demand that shuts the centre. With the 1 bar of other pumps the excavator of
-the tests is 28 mm off its line, with this 90 Pa 12 mm, and 7 mm with `BEGIN`."""
+less it is believed to, the smaller is the demand that shuts the centre."""
 BEGIN = 2e-3
 """Required speed at which valves begin to open, fully at twice that [m/s, rad/s of a motor]. Else noise of the sensors
 would shut and open the centre of a standing machine, which its shut valves hold."""
