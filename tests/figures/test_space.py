@@ -30,7 +30,9 @@ TOOL = Tool(
     geoms=(Geom(kind="sphere", size=(RADIUS,)),), mass=1e-3, center_of_mass=(0.0, 0.0, 0.0),
     inertia=(1e-6, 1e-6, 1e-6), frames={"tip": (0.0, 0.0, 0.0)},
 )  # fmt: skip
-OFF = {"robot.payload": np.array([1350.0, 1500.0]), "actuator.friction_scale": np.array([0.8, 1.2])}
+OFF = {"robot.payload": (1350.0, 1500.0), "actuator.friction_scale": (0.8, 1.2)}
+SEED, COUNT = 12, 64
+"""Of the trials in the corner."""
 
 
 class Press(Skill):
@@ -102,20 +104,20 @@ def test_a_push_along_the_diagonal_ends_in_the_corner_at_any_slew_angle(slew, tm
         ((0.0, 1.0, 0.0), np.array([0.0, RADIUS + HALF, 0.2]), (1.0, HALF, 0.3)),
     )
     where = scene(axes @ [-0.55, -0.45, 0.5], plates(axes, faces))
-    draws = {**OFF, "start.offset_x": np.array([0.1, -0.1])}
-    setup, rngs = (
-        Setup(robot=load_robot_model(str(folder)), scene=where),
-        [np.random.default_rng([4, i]) for i in (0, 1)],
-    )
-    result = simulate(Press(axes @ [1.0, 1.0, -1.0]), setup, draws, rngs, duration_s=24.0, trace_hz=100.0)
+    rng = np.random.default_rng(SEED)
+    draws = {name: rng.uniform(*ends, COUNT) for name, ends in OFF.items()}
+    draws |= {f"start.offset_{axis}": rng.uniform(-0.1, 0.1, COUNT) for axis in "xy"}
+    setup = Setup(robot=load_robot_model(str(folder)), scene=where)
+    rngs = [np.random.default_rng([SEED, i]) for i in range(COUNT)]
+    result = simulate(Press(axes @ [1.0, 1.0, -1.0]), setup, draws, rngs, duration_s=24.0, trace_hz=20.0)
     ends = np.array([(trace.position[-1] - corner) @ axes for trace in result.traces]) * [1.0, 1.0, -1.0]
+    inside = np.all((ends > 0.003) & (ends < 0.02), axis=1)
     row(
-        f"excavator in the corner of three plates at slew {slew}",
-        np.round(1e3 * ends, 1).tolist(),
-        "mm into each plate",
-    )
-    assert not any(result.failure)
-    assert np.all(ends > 0.003) and np.all(ends < 0.02)
+        f"excavator in the corner of three plates at slew {slew}", f"{inside.sum()} of {COUNT}",
+        f"{1e3 * ends.min():.1f} to {1e3 * ends.max():.1f} mm into each plate",
+        f"peak {result.peak_force_n.max() / 1e3:.0f} kN", *sorted({str(each) for each in result.failure if each}),
+    )  # fmt: skip
+    assert inside.all()
 
 
 def test_the_force_of_a_slide_in_space_is_within_4_percent_rms_and_10_at_most_without_a_sensor(tmp_path):
@@ -137,7 +139,8 @@ def test_the_force_of_a_slide_in_space_is_within_4_percent_rms_and_10_at_most_wi
         Setup(robot=load_robot_model(str(folder)), scene=where),
         [np.random.default_rng([4, i]) for i in (0, 1)],
     )
-    result = simulate(Follow(path, Stiffness(1.5e5, 1.5e5)), setup, OFF, rngs, duration_s=16.0, trace_hz=1000.0)
+    off = {name: np.array(ends) for name, ends in OFF.items()}
+    result = simulate(Follow(path, Stiffness(1.5e5, 1.5e5)), setup, off, rngs, duration_s=16.0, trace_hz=1000.0)
     assert not any(result.failure)
     for trace in result.traces:
         kernel = np.full(100, 0.01)

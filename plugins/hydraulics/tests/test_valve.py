@@ -85,6 +85,18 @@ def test_two_deviations_of_the_oil_cover_one_of_0_7_of_the_modulus_that_is_belie
     assert 1.0 + 2.0 * (1.0 / (1.0 - ValveSettings().oil) - 1.0) >= 1.0 / 0.7
 
 
+def test_a_few_rows_that_lie_on_a_line_by_chance_are_no_overlap():
+    """Five rows in which a piston keeps its speed while the command rises by a fifth, alone a slope of zero."""
+    known = ValveIdentification(CYLINDERS, 1, DT)
+    valve = np.full((1, 3), 0.06)
+    velocity, *pressures = steady(CYLINDERS, valve, np.zeros(3), 190e5)
+    for k in range(60):
+        known.step(valve + 2e-4 * k, *machine(np.full((1, 3), 0.3), velocity, pressures))
+    known.solve()
+    assert np.all(np.abs(known.overlap) < 2.0 * known.overlap_deviation)
+    assert np.all(np.abs(known.ratio - 1.0) < 2.0 * known.settings.share)
+
+
 @pytest.mark.slow
 def test_what_is_compensated_lies_a_deviation_below_what_was_found_and_never_below_zero():
     known = found(true=0.0 * OVERLAP)

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from skillframe_hydraulics.checks.feasibility import areas, capacity, problems
+from skillframe_hydraulics.checks.feasibility import areas, capacity, moved_by, problems
 from skillframe_hydraulics.checks.working_range import largest_forces, working_range
+from skillframe_hydraulics.faults import moved_joints
 from skillframe_hydraulics.law.hydraulic import tool_task
 
 from skillframe.cli.main import run
@@ -156,3 +157,16 @@ def test_a_start_out_of_reach_says_so_and_no_joint_turns_around():
     z = task.solve(chain, np.array([2.5, 1.3]), home)
     assert not problems(chain, z)
     assert len(areas(chain.robot.spec.actuation)) == 4
+
+
+def test_a_bucket_cylinder_on_a_loaders_frame_moves_the_bucket_and_has_its_dead_centre_there():
+    """It turns with the arm, too, and more so. With the arm held, its motion over the bucket's is that."""
+    chain = chain_of("komatsu_wa380")
+    assert [chain.independent[j] for j in moved_joints(chain)] == ["arm", "arm", "bucket"]
+    at, rod = np.array([0.526, -1.402]), int(chain.model.joints[chain.model.getJointId("tilt_rod")].idx_q)
+    ahead, behind = (chain.configuration(at + np.array([0.0, step]))[rod] for step in (1e-5, -1e-5))
+    own = (ahead - behind) / 2e-5
+    arms = chain.at(at, np.zeros(2)).arms[2]
+    assert arms[1] == pytest.approx(own, abs=1e-6) and abs(arms[0]) > 10.0 * abs(own)
+    assert f"tilt_rod is near its dead centre: its moment arm is {abs(own):.3f} m" in " ".join(problems(chain, at))
+    assert moved_by(np.diag([1.0, 2.0])[[0, 1, 1]]).tolist() == [0, 1, 1]  # one of twins beside the other

@@ -49,6 +49,29 @@ def test_a_given_stiffness_replaces_the_surfaces_own(plant):
     assert rows[-1, 0] == pytest.approx(-0.02, rel=1e-3)
 
 
+def test_a_second_stop_yields_across_and_closes_the_corner(plant, scene):
+    """Pushed along the diagonal by 2 kN an axis without friction, the tool deflects each surface by 2 mm."""
+    params = {"side_stop": True, "friction": 0.0, "above": 0.01, "away": 0.01, "aside": 0.01}
+    now = plant("free_tool", "pallets", **params)
+    push(now, 2000.0 * np.array([1.0, 1.0, -1.0]), 1500)
+    names = ("stop", "side_stop", "stack")
+    yields = [now.state[0][0, now.model.joint(SPRUNG + name).qposadr[0]] for name in names]
+    np.testing.assert_allclose(yields, [2e-3, 2e-3, -2e-3], rtol=1e-3)
+    away = now.tool_pose().position[0] - now.fixture_pose().position[0] - scene("pallets", **params).reached[0]
+    assert np.all(away * [1.0, 1.0, -1.0] > 2e-3) and np.linalg.norm(away) < 5e-3
+    np.testing.assert_allclose(scene("pallets", **params).task.direction, np.array([1.0, 1.0, -1.0]) / np.sqrt(3.0))
+
+
+@pytest.mark.parametrize("room", [{"away": 0.01}, {"above": 0.01}, {"aside": 0.01}])
+def test_no_demonstration_begins_behind_a_surface(scene, room):
+    """However near to it the tool's nominal start is."""
+    where = scene("pallets", side_stop=True, **room)
+    for start in where.task.starts:
+        offset = np.array([start.get(f"start.offset_{axis}", 0.0) for axis in "xyz"])
+        left = (np.array(where.reached[0]) - where.start_tip - offset) * [1.0, 1.0, -1.0]
+        assert np.all(left > 0.0)
+
+
 @pytest.mark.parametrize(("stiffness", "ratio"), [(1e6, 0.1), (3e4, 0.5)])
 def test_a_surface_let_go_swings_at_its_natural_frequency_and_dies_away_by_its_damping(plant, stiffness, ratio):
     now = plant("free_tool", "pallets", stiffness=stiffness, damping_ratio=ratio)

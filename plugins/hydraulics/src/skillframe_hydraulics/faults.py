@@ -20,6 +20,7 @@ from skillframe.errors import InputError
 from skillframe.fmu import Actuators
 from skillframe.frames import Float
 from skillframe.robot import ClosedChain
+from skillframe_hydraulics.checks.feasibility import moved_by
 from skillframe_hydraulics.quantities import FAULTS
 from skillframe_hydraulics.sensors import MachineSensors
 
@@ -121,8 +122,7 @@ class Faults:
 def moved_joints(chain: ClosedChain) -> NDArray[np.int64]:
     """The minimal coordinate (k,) that each cylinder moves, at home."""
     state = chain.at(chain.minimal(chain.home), np.zeros(len(chain.independent)))
-    joints: NDArray[np.int64] = np.argmax(np.abs(state.arms), axis=1)
-    return joints
+    return moved_by(state.arms)
 
 
 class BrokenParts:

@@ -14,6 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
 
 from skillframe.errors import InputError
 from skillframe.frames import Float, norm
@@ -87,7 +89,8 @@ def problems(chain: ClosedChain, z: Float) -> list[str]:
             found.append(f"the linkage of {name} is near its dead centre: {far}")
     found += _outside(chain, state.q)
     strokes = {a.joint: float(a.known.get("stroke", math.inf)) for a in chain.robot.spec.actuation}
-    for name, arm in zip(chain.actuated, np.abs(state.arms).max(axis=1), strict=True):
+    own = np.take_along_axis(np.abs(state.arms), moved_by(state.arms)[:, None], axis=1)[:, 0]
+    for name, arm in zip(chain.actuated, own, strict=True):
         least = min(LEAST_ARM, strokes.get(name, math.inf) / 6.0)
         if name not in chain.independent and arm < least:
             found.append(f"{name} is near its dead centre: its moment arm is {arm:.3f} m, below {least:.3g} m")
@@ -98,6 +101,22 @@ def problems(chain: ClosedChain, z: Float) -> list[str]:
                 found += _overload(actuation, force, spec.folder / "robot.toml")
                 found += opens_by_itself(actuation, float(force))
     return found
+
+
+def moved_by(arms: Float) -> NDArray[np.int64]:
+    """The coordinate (k,) that each actuator moves, of arms dx/dz (k, n).
+
+    A bucket's cylinder on the frame of a loader turns with the arm, too, which its own cylinder moves: of all pairings
+    it is that with the largest product of arms. An actuator beside another one moves what that one moves.
+    """
+    size = np.maximum(np.abs(arms), 1e-12)
+    rows, columns = linear_sum_assignment(-np.log(size))
+    moved = np.empty(len(arms), dtype=np.int64)
+    moved[rows] = columns
+    direction = arms / norm(size)[:, None]
+    for row in set(range(len(arms))) - set(rows.tolist()):
+        moved[row] = columns[np.argmax(np.abs(direction[rows] @ direction[row]))]
+    return moved
 
 
 def strained_actuators(chain: ClosedChain, z: Float) -> Iterator[str]:
