@@ -122,7 +122,7 @@ class Faults:
 def moved_joints(chain: ClosedChain) -> NDArray[np.int64]:
     """The minimal coordinate (k,) that each cylinder moves, at home."""
     state = chain.at(chain.minimal(chain.home), np.zeros(len(chain.independent)))
-    return moved_by(state.arms)
+    return moved_by(state.arms[:, : chain.steered])
 
 
 class BrokenParts:

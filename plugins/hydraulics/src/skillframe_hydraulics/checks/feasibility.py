@@ -89,7 +89,7 @@ def problems(chain: ClosedChain, z: Float) -> list[str]:
             found.append(f"the linkage of {name} is near its dead centre: {far}")
     found += _outside(chain, state.q)
     strokes = {a.joint: float(a.known.get("stroke", math.inf)) for a in chain.robot.spec.actuation}
-    own = np.take_along_axis(np.abs(state.arms), moved_by(state.arms)[:, None], axis=1)[:, 0]
+    own = np.take_along_axis(np.abs(state.arms), moved_by(state.arms[:, : chain.steered])[:, None], axis=1)[:, 0]
     for name, arm in zip(chain.actuated, own, strict=True):
         least = min(LEAST_ARM, strokes.get(name, math.inf) / 6.0)
         if name not in chain.independent and arm < least:
@@ -104,7 +104,7 @@ def problems(chain: ClosedChain, z: Float) -> list[str]:
 
 
 def moved_by(arms: Float) -> NDArray[np.int64]:
-    """The coordinate (k,) that each actuator moves, of arms dx/dz (k, n).
+    """The coordinate (k,) that each actuator moves, of arms dx/dz (k, n) of the steered coordinates.
 
     A bucket's cylinder on the frame of a loader turns with the arm, too, which its own cylinder moves: of all pairings
     it is that with the largest product of arms. An actuator beside another one moves what that one moves.

@@ -20,7 +20,7 @@ from skillframe.errors import InputError
 from skillframe.frames import Float
 from skillframe.robot import ClosedChain
 from skillframe_hydraulics.law.vdc_actuator import ContactFriction
-from skillframe_hydraulics.law.vdc_reference import ToolTask, swung_by
+from skillframe_hydraulics.law.vdc_reference import ToolTask
 
 
 class Measured(NamedTuple):
@@ -155,14 +155,10 @@ def tool_task(chain: ClosedChain) -> ToolTask:
     """The task of the tool along its axes, and of the joints that follow the first m.
 
     Raises:
-        InputError: as `tool_axes`, or fewer freedoms than axes, or a tool on one of several passive joints, or a
-            fixture beside a machine's plane.
+        InputError: as `tool_axes`, or fewer freedoms than axes, or a fixture beside a machine's plane.
     """
     axes, spec = tool_axes(chain), chain.robot.spec
     state = chain.at(chain.minimal(chain.home), np.zeros(len(chain.free)))
-    if swung_by(chain) and len(chain.free) - chain.steered > 1:
-        text = f"tool_frame {spec.arm[0].tool_frame} hangs on one of several passive joints"
-        raise InputError(f"{spec.folder / 'robot.toml'}: arm", text, "name the link that they hang on")
     if len(axes) == 2:
         normal, fixture = np.cross(*axes), np.asarray(spec.workspace.fixture, dtype=float)
         beside = float(normal @ (fixture - state.data.oMf[chain.robot.tool_frames[0]].translation))

@@ -38,6 +38,8 @@ from skillframe_hydraulics.law.vdc_reference import required_motion, swung_by
 from skillframe_hydraulics.symbolic_or_numeric import clip
 
 _KEPT: dict[tuple[Any, ...], tuple[ca.Function, ca.Function, ca.Function]] = {}
+SWEEPS = 2
+"""Over passive joints: hinges at right angles hang at rest after the first, but for their distance."""
 SCALARS = ("body", "adaptation", "coulomb", "viscous", "joint", "corner", "touch", "sliding", "dt", "fresh")
 
 
@@ -91,10 +93,20 @@ def _potential(s: SymbolicChain, rows: Expression) -> Expression:
 
 
 def _hung(s: SymbolicChain, rows: Expression, tip: Expression) -> Expression:
-    """A tool's place with its passive joint, the last of z, where U = a cos p + b sin p + c is least."""
-    p = s.q[int(s.chain.free[-1])]
-    ahead, aside, behind = (ca.substitute(_potential(s, rows), p, ca.SX(angle)) for angle in (0.0, np.pi / 2, np.pi))
-    return ca.substitute(tip, p, ca.atan2(0.5 * (ahead + behind) - aside, 0.5 * (behind - ahead)))
+    """A tool's place with its passive joints, the last of z, where the potential is least.
+
+    Of one joint it is U = a cos p + b sin p + c. Several are set one after the other, `SWEEPS` times.
+    """
+    angles, potential = s.q[s.chain.free[s.chain.steered :].tolist()], _potential(s, rows)
+    hanging, count = ca.SX(angles), angles.shape[0]
+    for joint in list(range(count)) * (SWEEPS if count > 1 else 1):
+        turned = []
+        for angle in (0.0, np.pi / 2, np.pi):
+            hanging[joint] = angle
+            turned.append(ca.substitute(potential, angles, hanging))
+        ahead, aside, behind = turned
+        hanging[joint] = ca.atan2(0.5 * (ahead + behind) - aside, 0.5 * (behind - ahead))
+    return ca.substitute(tip, angles, hanging)
 
 
 def law_function(chain: ClosedChain, axes: Float) -> ca.Function:

@@ -38,7 +38,7 @@ WIDEST = 0.5
 
 
 def swung_by(chain: ClosedChain) -> bool:
-    """Whether a passive joint swings the tool."""
+    """Whether passive joints swing the tool."""
     state = chain.at(chain.minimal(chain.home), np.zeros(len(chain.free)))
     swing: Float = state.jacobian(chain.robot.tool_frames[0])[:3, chain.steered :]
     return bool(np.abs(swing).max(initial=0.0) > 1e-9)
@@ -47,7 +47,7 @@ def swung_by(chain: ClosedChain) -> bool:
 class ToolTask:
     """The n commanded quantities: axes of the tool's position in base, then independent joints.
 
-    A tool that swings on a passive joint is commanded to where it hangs at rest.
+    A tool that swings on passive joints is commanded to where it hangs at rest.
 
     Args:
         chain: the machine.
@@ -81,14 +81,14 @@ class ToolTask:
     def jacobian(self, state: ChainState) -> Float:
         """J_t (n, n)."""
         moved, still = self._hung(state), np.eye(len(state.z))
-        if self._swung:  # the passive joint follows so that its weight's moment stays zero
+        if self._swung:  # the passive joints follow so that their weights' moments stay zero
             s, h = self._chain.steered, 1e-5
             pairs = [
                 (self._chain.at(moved.z + h * way, moved.zd), self._chain.at(moved.z - h * way, moved.zd))
                 for way in still
             ]
-            slope = np.array([(one.gravity[s] - other.gravity[s]) / (2.0 * h) for one, other in pairs])
-            still[s] = np.append(-slope[:s] / slope[s], 0.0)
+            slope = np.array([(one.gravity[s:] - other.gravity[s:]) / (2.0 * h) for one, other in pairs]).T
+            still[s:] = np.hstack([-np.linalg.solve(slope[:, s:], slope[:, :s]), np.zeros((len(slope), len(slope)))])
         return np.concatenate([self.axes @ moved.jacobian(self._frame)[:3] @ still, np.eye(len(state.z))[self._joints]])
 
     def drift(self, state: ChainState, rate: Float) -> Float:
