@@ -6,6 +6,8 @@
 #include "physics.h"
 
 enum { A, B };   /* chambers */
+static const int TRAVELS[8] = {TRAVEL_1, TRAVEL_2, TRAVEL_3, TRAVEL_4, TRAVEL_5, TRAVEL_6, TRAVEL_7, TRAVEL_8};
+static const int OPENINGS[8] = {OPENING_1, OPENING_2, OPENING_3, OPENING_4, OPENING_5, OPENING_6, OPENING_7, OPENING_8};
 
 typedef struct {
     double position, velocity, acceleration;
@@ -69,28 +71,43 @@ static inline void cushion_of(const Model *m, double room, double room_rate, dou
     *rate = *closing > 0.0 && *closing < 1.0 ? -room_rate / length : 0.0;
 }
 
+/* Opening of the edges at a travel of 0 to 1, and travel per opening there, README eq. 2. */
+static inline double opening_at(const Model *m, double x, double *steep)
+{
+    const double *v = m->value;
+    int last = (int)v[OPENING_POINTS] - 1, i = 0;
+    if (last < 0) {
+        *steep = 1.0 - v[DEADBAND];
+        return x > v[DEADBAND] ? (x - v[DEADBAND]) / *steep : 0.0;
+    }
+    if (x <= v[TRAVELS[0]]) return 0.0;
+    while (i < last - 1 && x > v[TRAVELS[i + 1]]) i++;
+    *steep = (v[TRAVELS[i + 1]] - v[TRAVELS[i]]) / (v[OPENINGS[i + 1]] - v[OPENINGS[i]]);
+    return v[OPENINGS[i]] + (x - v[TRAVELS[i]]) / *steep;
+}
+
 /* Valve flows into the chambers and their derivatives: rows of `by` are chambers, columns their pressures. */
 static inline void valve(const Model *m, const Motion *w, const double p[2], Chambers *c, double by[2][2], double drift[2])
 {
     const double *v = m->value;
-    double x = clip(w->spool.x, -1.0, 1.0), travel = 1.0 - v[DEADBAND];
-    double open = fabs(x) > v[DEADBAND] ? (fabs(x) - v[DEADBAND]) / travel : 0.0;
-    double rate = open > 0.0 && fabs(w->spool.x) <= 1.0 ? (x > 0.0 ? w->spool.v : -w->spool.v) / travel : 0.0;
+    double x = clip(w->spool.x, -1.0, 1.0), steep = 1.0, open = opening_at(m, fabs(x), &steep);
+    double rate = open > 0.0 && fabs(w->spool.x) <= 1.0 ? (x > 0.0 ? w->spool.v : -w->spool.v) / steep : 0.0;
     double closing, closing_rate;
     int feeds = x > 0.0 ? A : B, drains = x > 0.0 ? B : A;
     c->flow_a = c->flow_b = c->flow_supply = c->supply_slope = 0.0;
     if (open <= 0.0) return;
     double wide_in = v[feeds == A ? EDGE_PA : EDGE_PB], wide_out = v[drains == A ? EDGE_AT : EDGE_BT];
-    double drop = v[SUPPLY_PRESSURE] - v[SUPPLY_DROP] - p[feeds];
+    const int kept = v[HELD_PRESSURE] > 0.0 && v[HELD_PRESSURE] > p[feeds];   /* by a compensator, README eq. 14 */
+    double drop = v[SUPPLY_PRESSURE] - v[SUPPLY_DROP] - (kept ? v[HELD_PRESSURE] : p[feeds]);
     Edge in = {0.0, 0.0, 0.0, 0.0};
-    if (drop >= 0.0 || (v[FEED_CHECK] == 0.0 && held_at(m, feeds, p).open < 0.0))
+    if (drop >= 0.0 || (!kept && v[FEED_CHECK] == 0.0 && held_at(m, feeds, p).open < 0.0))
         in = through_edge(m, wide_in * open, wide_in * rate, drop, 0.0, 0.0, -1.0);
     double room = drains == A ? w->position : v[STROKE] - w->position;
     cushion_of(m, room, drains == A ? w->velocity : -w->velocity, &closing, &closing_rate);
     Held held = held_at(m, drains, p);
     Edge out = through_edge(m, wide_out * open, wide_out * rate, p[drains] - v[RETURN_PRESSURE], closing, closing_rate,
                             held.open);
-    by[feeds][feeds] -= in.by_dp, drift[feeds] += in.by_time;
+    by[feeds][feeds] -= kept ? 0.0 : in.by_dp, drift[feeds] += in.by_time;
     if (held.open >= 0.0)
         for (int j = A; j <= B; j++) by[drains][j] -= out.by_held * held.by[j];
     by[drains][drains] -= out.by_dp, drift[drains] -= out.by_time;

@@ -29,6 +29,25 @@ static inline Outcome require(int fine, const char *name, const char *rule, doub
 #define POSITIVE(i) require(v[i] > 0.0, VARIABLES[i].name, "greater than zero", v[i], r)
 #define NOT_NEGATIVE(i) require(v[i] >= 0.0, VARIABLES[i].name, "zero or more", v[i], r)
 
+/* Points of the opening: from no opening to (1, 1), rising. */
+static inline Outcome check_opening(const Model *m, Report *r)
+{
+    const double *v = m->value;
+    int count = (int)v[OPENING_POINTS], last = count - 1;
+    Outcome out = require(v[OPENING_POINTS] == count && count >= 2 && count <= 8, "opening_points", "0, or 2 to 8", v[OPENING_POINTS], r);
+    if (out == OK) out = require(v[DEADBAND] == 0.0, "deadband", "0 beside opening_points, whose first one is the overlap", v[DEADBAND], r);
+    if (out == OK) out = require(v[OPENING_1] == 0.0, "opening_1", "0", v[OPENING_1], r);
+    if (out == OK) out = require(v[TRAVEL_1] >= 0.0, "travel_1", "zero or more", v[TRAVEL_1], r);
+    for (int i = 0; i < last && out == OK; i++) {
+        out = require(v[TRAVELS[i + 1]] > v[TRAVELS[i]], VARIABLES[TRAVELS[i + 1]].name, "above that of the point before", v[TRAVELS[i + 1]], r);
+        if (out == OK)
+            out = require(v[OPENINGS[i + 1]] > v[OPENINGS[i]], VARIABLES[OPENINGS[i + 1]].name, "above that of the point before", v[OPENINGS[i + 1]], r);
+    }
+    if (out == OK) out = require(v[TRAVELS[last]] == 1.0, VARIABLES[TRAVELS[last]].name, "1 at the last point", v[TRAVELS[last]], r);
+    if (out == OK) out = require(v[OPENINGS[last]] == 1.0, VARIABLES[OPENINGS[last]].name, "1 at the last point", v[OPENINGS[last]], r);
+    return out;
+}
+
 static inline Outcome check_parameters(const Model *m, Report *r)
 {
     static const int positive[] = {BORE, STROKE, DEAD_VOLUME_A, DEAD_VOLUME_B, BULK_MODULUS, RATED_FLOW,
@@ -47,6 +66,7 @@ static inline Outcome check_parameters(const Model *m, Report *r)
     if (out == OK) out = require(v[ROD] < v[BORE], "rod", "smaller than bore", v[ROD], r);
     if (out == OK) out = require(v[AIR_FRACTION] < 0.5, "air_fraction", "below 0.5", v[AIR_FRACTION], r);
     if (out == OK) out = require(v[DEADBAND] < 1.0, "deadband", "below 1", v[DEADBAND], r);
+    if (out == OK && v[OPENING_POINTS] != 0.0) out = check_opening(m, r);
     if (out == OK)
         out = require(v[COUNTERBALANCE_A] == 0.0 || v[COUNTERBALANCE_B] == 0.0, "counterbalance_b",
                       "0 beside counterbalance_a: a cylinder has one counterbalance valve", v[COUNTERBALANCE_B], r);

@@ -27,12 +27,14 @@ from skillframe.signals import RateFilter
 from tests.oracle.valve_law import (
     across_deadband,
     bristle_after,
+    compensated,
     coulomb_shape,
     flow_demand,
     friction_regressor,
     inverse_valve,
     pressure_force,
     pursued,
+    through_points,
 )
 from tests.oracle.vdc import Bodies, Reduced, adapt, bodies, net_forces, piston_forces, reduced
 from tests.oracle.vdc_reference import Path, required_motion
@@ -185,6 +187,11 @@ class HydraulicLaw:
         rate = self._force_rate.step(force)
         pressures = (measured.pressure_a, measured.pressure_b)
         demand = flow_demand(self.cylinders, self._cylinder_gains, motion, (force, rate), pressures)
-        opening = inverse_valve(self.cylinders, demand, motion[0], pressures, self.supply)
-        valve = np.clip(across_deadband(self.deadband, opening), -1.0, 1.0)
+        given = self.cylinders, demand, motion[0], pressures, self.supply
+        kinds = {one["compensation"]: one["margin"] for one in self.chain.robot.spec.tables.get("supply", {}).values()}
+        if kinds:
+            opening = compensated(*given, self.deadband, kinds.get("pre"))
+        else:
+            opening = inverse_valve(*given)
+        valve = np.clip(through_points(self.cylinders, across_deadband(self.deadband, opening)), -1.0, 1.0)
         return Demand(valve, force, pressure_force(self.cylinders, *pressures))

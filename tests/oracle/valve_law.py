@@ -82,15 +82,32 @@ def flow_demand(
 
 
 def inverse_valve(
-    c: Cylinders, demand: Float, x: Float, pressures: tuple[Float, Float], supply: Float | None = None
+    c: Cylinders, demand: Float, x: Float, pressures: tuple[Float, Float], supply: Float | None = None,
+    held: Float | None = None,
 ) -> Float:  # fmt: skip
-    """Opening u_e (..., n) of the edges, not limited, that makes the flow demand; supply: p_S, nominal if not given."""
+    """Opening u_e (..., n) of the edges, not limited, that makes the flow demand; supply: p_S, nominal if not given.
+
+    held: least pressure behind the edges from the supply.
+    """
     (p_a, p_b), high = pressures, c.supply_pressure if supply is None else supply
+    in_a, in_b = pressures if held is None else [np.where(held > p, held, p) for p in pressures]
     x = np.where(c.stroke > 0.0, x, 0.0)  # a motor's chambers keep their volumes
     a, b = 1.0 / (c.arm_a + x), 1.0 / (c.arm_b + c.stroke - x)
-    extend = np.sqrt(_drop(c, high - p_a)) * a + np.sqrt(_drop(c, p_b - c.return_pressure)) * b
-    retract = np.sqrt(_drop(c, high - p_b)) * b + np.sqrt(_drop(c, p_a - c.return_pressure)) * a
+    extend = np.sqrt(_drop(c, high - in_a)) * a + np.sqrt(_drop(c, p_b - c.return_pressure)) * b
+    retract = np.sqrt(_drop(c, high - in_b)) * b + np.sqrt(_drop(c, p_a - c.return_pressure)) * a
     return np.asarray(demand / (c.edge * np.where(demand > 0.0, extend, retract)))
+
+
+def compensated(
+    c: Cylinders, demand: Float, x: Float, pressures: tuple[Float, Float], supply: Float, deadband: Float,
+    margin: float | None,
+) -> Float:  # fmt: skip
+    """u_e (N, n) of one pump's compensated valves of full chambers; margin: of pre-compensated ones, None of others."""
+    if margin is not None:
+        return inverse_valve(c, demand, x, pressures, supply, supply - margin)
+    u = across_deadband(deadband, inverse_valve(c, demand, x, pressures, supply))
+    load = np.where(np.abs(u) > deadband + 2e-3, np.where(u > 0.0, *pressures), 0.0)
+    return inverse_valve(c, demand, x, pressures, supply, load.max(axis=-1, keepdims=True))
 
 
 def opening(deadband: Float, command: Float) -> Float:
@@ -101,6 +118,16 @@ def opening(deadband: Float, command: Float) -> Float:
 def across_deadband(deadband: Float, opening: Float) -> Float:
     """Command u (..., n) that opens a valve of overlap b as wanted, u_e."""
     return np.asarray((1.0 - deadband) * opening + deadband * np.tanh(opening / ACROSS))
+
+
+def through_points(c: Cylinders, command: Float) -> Float:
+    """Travels (N, n) at which the valves' points give these openings, across the overlap as `across_deadband`."""
+    size, found = np.abs(command).clip(max=1.0), command.copy()
+    for i in np.flatnonzero(c.openings.has if c.openings else ()):
+        travel, share = c.openings.travel[:, i], c.openings.share[:, i]
+        overlap = travel[0] * (np.tanh(size[:, i] / ACROSS) - 1.0)
+        found[:, i] = np.copysign(np.interp(size[:, i], share, travel) + overlap, command[:, i])
+    return found
 
 
 def _drop(c: Cylinders, drop: Float) -> Float:

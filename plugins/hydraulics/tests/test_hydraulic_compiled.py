@@ -1,5 +1,7 @@
 """The generated law and the readable one are one law."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from skillframe_hydraulics.law.generated import NOTE, source
@@ -8,6 +10,7 @@ from skillframe_hydraulics.law.hydraulic_compiled import CompiledLaw
 from skillframe_hydraulics.law.hydraulic_symbolic import law_function
 from skillframe_hydraulics.law.vdc_actuator import cylinders
 
+from skillframe.robot.chain import ClosedChain
 from tests.laws.vdc_loop import START, crane
 from tests.oracle.hydraulic_law import HydraulicLaw, terms
 
@@ -15,8 +18,15 @@ DT = 1e-3
 SAME = 1e-9  # relative; both do some thousand operations in double precision, in another order
 
 
-def machine():
-    return crane(), cylinders(crane().robot.spec.actuation), HydraulicGains(friction=(1e5, 2e5))
+def machine(chain=None):
+    return chain or crane(), cylinders(crane().robot.spec.actuation), HydraulicGains(friction=(1e5, 2e5))
+
+
+def fed_by(compensation):
+    """The crane with a pump of compensated valves."""
+    pump = {"kind": "load_sensing", "flow": 3e-3, "volume": 0.01, "margin": 15e5, "compensation": compensation}
+    spec = dataclasses.replace(crane().robot.spec, tables={"supply": {"main": pump}})
+    return ClosedChain(dataclasses.replace(crane().robot, spec=spec))
 
 
 def draw(rng, count):
@@ -77,6 +87,40 @@ def test_the_generated_law_is_the_readable_law_sample_after_sample(use_compiler)
     for law in laws:
         law.start()
     close(*(law.step(*draw(np.random.default_rng(4), count), everyone) for law in reversed(laws)))
+
+
+@pytest.mark.parametrize("compensation", ["pre", "post"])
+def test_the_generated_law_of_compensated_valves_is_the_readable_one(compensation):
+    rng, count, everyone = np.random.default_rng(3), 8, np.arange(8)
+    plain = CompiledLaw(*machine(), count, DT, use_compiler=False)
+    parts = machine(fed_by(compensation))
+    laws = [HydraulicLaw(*parts, count, DT), CompiledLaw(*parts, count, DT, use_compiler=False)]
+    deadband, supply = 0.02 * rng.random((count, 3)), 190e5 + 20e5 * rng.random((count, 3))
+    for law in (*laws, plain):
+        law.deadband[:], law.supply[:] = deadband, supply
+    for _ in range(4):
+        measured, reference = draw(rng, count)
+        readable, generated, other = (law.step(measured, reference, everyone) for law in (*laws, plain))
+        close(generated, readable)
+        assert np.abs(generated.valve - other.valve).max() > 0.1
+
+
+def test_the_generated_law_of_valves_with_points_is_the_readable_one():
+    """The second valve has none. Interpolation by numpy, with a residual overlap of up to 2 % of the flow."""
+    points = {"opening_points": 3, "travel_1": 0.1, "opening_1": 0.0, "travel_2": 0.5, "opening_2": 0.12}
+    spec = crane().robot.spec
+    own = [dataclasses.replace(a, parameters={**a.parameters, **points}) for a in spec.actuation]
+    spec = dataclasses.replace(spec, actuation=(own[0], spec.actuation[1], own[2]))
+    chain = ClosedChain(dataclasses.replace(crane().robot, spec=spec))
+    rng, count, everyone = np.random.default_rng(3), 8, np.arange(8)
+    parts = chain, cylinders(spec.actuation), machine()[2]
+    laws = [HydraulicLaw(*parts, count, DT), CompiledLaw(*parts, count, DT, use_compiler=False)]
+    deadband = 0.02 * rng.random((count, 3))
+    for law in laws:
+        law.deadband[:] = deadband
+    for _ in range(4):
+        measured, reference = draw(rng, count)
+        close(*(law.step(measured, reference, everyone) for law in reversed(laws)))
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from skillframe_hydraulics.cylinder import equations as eq
 from skillframe_hydraulics.declared import impossible_supplies
 from skillframe_hydraulics.entry import told
-from skillframe_hydraulics.law.line_ahead import BEGIN, STILL, inverse_ahead, open_centres
+from skillframe_hydraulics.law.line_ahead import BEGIN, STILL, inverse_ahead, known_lines
 from skillframe_hydraulics.law.vdc_actuator import CYLINDER, Cylinders, chamber_lengths, cylinders, inverse_valve
 from skillframe_papers.rows.crane_runs import MOVING, Follow, blend, scene
 
@@ -208,7 +208,7 @@ def test_the_law_opens_its_valves_where_flows_and_centres_take_what_the_pump_giv
     c = cylinders(spec.actuation)
     into = np.abs(u) * c.edge * root(at - np.where(u > 0.0, p_a, p_b))
     share = root(at - 5e5) / root(12e5) / np.sqrt(np.mean((1.0 - np.abs(u)) ** -2.0))
-    lines = open_centres(spec)
+    lines = known_lines(spec)
     lines = lines._replace(flow=np.array([into.sum() / (1.0 - share)]))
     c, law = law_of_lines(spec, lines)
     length_a, length_b = chamber_lengths(c, x)
@@ -230,7 +230,7 @@ def test_the_law_shuts_the_centre_for_a_small_flow_and_opens_nothing_below_a_req
     1/o^2 = 5 (145 bar / drop) - 4 with all of 300 l/min through the centre. STILL takes a part of the demand.
     """
     spec = load_robot(excavator())
-    c, law = law_of_lines(spec, open_centres(spec))
+    c, law = law_of_lines(spec, known_lines(spec))
     p_a, p_b, x = np.full(5, 150e5), np.full(5, 5e5), np.full(5, 0.4)
     demand = np.array([0.0, 5e-3 / 60 / chamber_lengths(c, x)[0][1], 0.0, 0.0, 0.0])
     u = law(demand, x, 0.0 * x, np.full(5, 1.0), p_a, p_b, np.full(5, 150.2e5))
@@ -249,7 +249,7 @@ def test_the_law_shuts_the_centre_for_a_small_flow_and_opens_nothing_below_a_req
 def test_an_emptied_chamber_makes_no_force_by_filling(excavator):
     """At 1 bar below the return line only what drains counts, of the demand less the emptied chamber's motion."""
     spec = load_robot(excavator())
-    c, law = law_of_lines(spec, open_centres(spec))
+    c, law = law_of_lines(spec, known_lines(spec))
     p_a, p_b, x, speed = np.full(5, 4e5), np.full(5, 65e5), np.full(5, 0.4), np.full(5, 0.05)
     length_a, length_b = chamber_lengths(c, x)
     u = np.full(5, 0.1)
@@ -259,7 +259,7 @@ def test_an_emptied_chamber_makes_no_force_by_filling(excavator):
     assert root(60e5) > STILL
 
 
-def run_line(folder, seconds=4.0, way=(0.4, 0.8, -0.4)):
+def run_line(folder, seconds=4.0, way=(0.4, 0.8, -0.4), draws=None):
     """The excavator's tool on a line, of 1 m by default: the result, and its distances from that line [m]."""
     way = np.array(way)
 
@@ -271,8 +271,8 @@ def run_line(folder, seconds=4.0, way=(0.4, 0.8, -0.4)):
     chain = ClosedChain(robot)
     tip = chain.at(chain.minimal(chain.home), np.zeros(4)).data.oMf[chain.robot.tool_frames[0]].translation
     setup = Setup(robot=robot, scene=scene(tip - np.array([5.0, 0.0, 0.0]), plate=False))
-    rngs = [np.random.default_rng(5)]
-    found = simulate(Follow(path, MOVING), setup, {}, rngs, duration_s=seconds + 1.5, trace_hz=100.0)
+    rngs = [np.random.default_rng(5 + i) for i in range(len(next(iter((draws or {"": [0]}).values()))))]
+    found = simulate(Follow(path, MOVING), setup, draws or {}, rngs, duration_s=seconds + 1.5, trace_hz=100.0)
     gone = found.traces[0].position - found.traces[0].position[0]
     along = way / np.linalg.norm(way)
     return found, np.linalg.norm(gone - np.outer(gone @ along, along), axis=1)

@@ -6,13 +6,15 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from skillframe_hydraulics.compensation import HELD, OPEN
 from skillframe_hydraulics.cylinder import equations as eq
 from skillframe_hydraulics.cylinder.bank import open_cylinders
 from skillframe_hydraulics.declared import DeclaredSupply, impossible_supplies, supplies_of
 from skillframe_hydraulics.entry import told
 from skillframe_hydraulics.law.hydraulic import Measured, Reference, Terms
+from skillframe_hydraulics.lines import Lines
 from skillframe_hydraulics.sharing import FlowSharing
-from skillframe_hydraulics.supply import NEEDED_IN, NEEDED_OUT, OPEN, Lines, Supplies
+from skillframe_hydraulics.supply import NEEDED_IN, NEEDED_OUT, Supplies
 from skillframe_papers.rows.crane_runs import MOVING, Follow, blend, scene
 
 from plugins.hydraulics.tests.test_cylinder_static import parameters
@@ -72,7 +74,7 @@ class Coupled:
     """Rows (x, x, p_a, p_a, p_b, p_b, p_S, Q) at every step, and energies [J] and volumes [m3] of the line."""
 
     def __init__(self, lines, step=H, end=END, commands=COMMANDS, own=OWN):
-        inputs = {name: name for name in (*INPUTS, NEEDED_IN)}
+        inputs = {name: name for name in (*INPUTS, NEEDED_IN, *((HELD,) if lines.compensated else ()))}
         outputs = {name: name for name in (*OUTPUTS, *NEEDED_OUT)}
         spec = ActuatorSpec(fmu="hydraulic_cylinder", parameters=own, inputs=inputs, outputs=outputs, name="c")
         self.bank, plant = open_cylinders([spec] * 2), Masses()
@@ -101,8 +103,7 @@ def one_system(lines, end=END):
     p = parameters(**OWN, initial_force=LOAD)
     softness, flow, margin = float(lines.softness[0]), float(lines.flow[0]), float(lines.margin[0])
     y = np.concatenate([np.full(2, 0.2), np.zeros(2), eq.equilibrium(p, np.zeros(2)).ravel(), [0.0, 0.0]])
-    oil = y[4:14].reshape(5, 2)
-    y[14] = min(RATED, oil[2:4].max() + margin)
+    y[14] = min(RATED, y[4:14].reshape(5, 2)[2:4].max() + margin)
     history = []
     for i, (begin, command) in enumerate(COMMANDS):
         u = np.array(command)
@@ -128,8 +129,7 @@ def one_system(lines, end=END):
         found = solve_ivp(f, (begin, at[-1]), y, method="Radau", t_eval=at, rtol=1e-8, atol=atol, max_step=5e-3)
         history.append(found.y.T)
         y = found.y[:, -1]
-    all_of_it = np.concatenate(history)
-    return all_of_it[:, [0, 1, 8, 9, 10, 11, 14, 15]]
+    return np.concatenate(history)[:, [0, 1, 8, 9, 10, 11, 14, 15]]
 
 
 @pytest.mark.slow

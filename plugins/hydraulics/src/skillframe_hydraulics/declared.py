@@ -61,6 +61,8 @@ class DeclaredSupply:
         response: time constant of the pump [s, 1ms to 2s].
         power: largest hydraulic power of the pump [W, 100W to 2000kW]; None: not limited.
         margin: of a load-sensing pump above the highest load [Pa, 1bar to 100bar].
+        compensation: of the valves of a load-sensing pump: "pre" keeps the drop over an edge from the line at `margin`,
+            "post" holds the highest load's pressure behind all of these edges.
         centre_drop: of open centres, from line to return line at the pump's flow with all spools in their middle
             [Pa, 1bar to 100bar].
         centre_shut: of open centres, share of a spool's travel at which its centre edge is shut [0.2 to 1].
@@ -74,6 +76,7 @@ class DeclaredSupply:
     response: float = 0.06
     power: float | None = None
     margin: float = 20e5
+    compensation: Literal["none", "pre", "post"] = "none"
     centre_drop: float = 12e5
     centre_shut: float = 1.0
     sharing: Literal["law", "none"] = "law"
@@ -127,6 +130,9 @@ def impossible_supplies(spec: RobotSpec) -> Iterator[tuple[str, str, str]]:
         if one.kind == "load_sensing" and one.margin >= pressure:
             text = f"is {one.margin / 1e5:g} bar, not below the supply_pressure of {pressure / 1e5:g} bar"
             yield f"{key}.margin", text, "give 10 to 30 bar, as usual"
+        if one.compensation != "none" and one.kind != "load_sensing":
+            text = f"is {one.compensation}, and compensated valves need a load-sensing pump, not {one.kind}"
+            yield f"{key}.compensation", text, 'write kind = "load_sensing", or leave compensation out'
         if one.kind == "open_centre":
             yield from _impossible_centre(key, one, [joints[joint] for joint in fed(spec, one)])
         leaked = sum(float(row.get("leakage", 0.0)) for row in own) * pressure
@@ -141,7 +147,9 @@ def _unmapped(actuation: Actuation, supply: DeclaredSupply) -> list[str]:
     if actuation.fmu == "hydraulic_cylinder":
         return []
     mapped = {*actuation.inputs, *actuation.outputs}
-    needed = ("supply_drop", "flow_supply", "supply_slope", *(("spool",) if supply.kind == "open_centre" else ()))
+    needed = ["supply_drop", "flow_supply", "supply_slope"]
+    needed += ["held_pressure"] if supply.compensation != "none" else []
+    needed += ["spool"] if supply.kind == "open_centre" or supply.compensation != "none" else []
     return [name for name in needed if name not in mapped]
 
 

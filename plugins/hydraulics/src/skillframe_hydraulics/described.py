@@ -17,6 +17,7 @@ from typing import Any
 from skillframe.config.units import si
 from skillframe.errors import InputError, UnknownName
 from skillframe.robot import Actuation
+from skillframe_hydraulics.opening import parameters_of
 
 SHORT = ("cylinder", "motor", "defaults")
 DRAWN = ("closed", "stroke", "mass")
@@ -121,6 +122,8 @@ def _actuation(table: dict[str, Any], joint: str, where: str) -> dict[str, Any]:
     if "dead_volume" in figures:  # of either chamber
         both = figures.pop("dead_volume")
         figures = {"dead_volume_a": both, "dead_volume_b": both, **figures}
+    if "opening" in figures:
+        figures = {**parameters_of(figures.pop("opening"), figures.get("deadband"), f"{where}.opening"), **figures}
     if "counterbalance" in figures:
         figures = {**_counterbalance(figures.pop("counterbalance"), f"{where}.counterbalance"), **figures}
     fmu = own.setdefault("fmu", CYLINDER)

@@ -44,9 +44,11 @@ from skillframe_hydraulics.law.hydraulic import Demand, Measured, Reference, too
 from skillframe_hydraulics.law.hydraulic_compiled import CompiledLaw
 from skillframe_hydraulics.law.vdc_actuator import cylinders
 from skillframe_hydraulics.law.vdc_reference import ToolTask
+from skillframe_hydraulics.lines import lines_of
+from skillframe_hydraulics.opening import opened, overlap
 from skillframe_hydraulics.sensors import LineGauges, MachineSensors
 from skillframe_hydraulics.sharing import FlowSharing
-from skillframe_hydraulics.supply import NEEDED_OUT, Supplies, lines_of, trial_values
+from skillframe_hydraulics.supply import Supplies, needed_by_lines, trial_values
 from skillframe_hydraulics.watch import MachineWatch
 
 __all__ = ["MachineDrive"]
@@ -95,7 +97,7 @@ class MachineDrive:
         self.estimator = CompiledEstimator(self.chain, known, self.count, self.dt, estimate, reads=reads)
         self.valves = ValveIdentification(known, self.count, self.dt, ValveSettings(corner=corner))
         broken = faults_in(draws)
-        self.bank = banks(spec, self.count, sorted(ports(broken)), lines=NEEDED_OUT if supplies_of(spec) else ())
+        self.bank = banks(spec, self.count, sorted(ports(broken)), lines=needed_by_lines(spec))
         self.faults = (
             BrokenParts(self.chain, self.bank, draws, self.gauges, self.dt, -round(SWING_S / self.dt))
             if broken
@@ -132,8 +134,8 @@ class MachineDrive:
                 raise InputError(where, text, "map it under outputs of its [[actuation]]")
         self.supplies: Supplies | None = None
         if supplies_of(spec):
-            overlap = trial_values(own, "deadband", known.deadband, self.count)
-            self.supplies = Supplies(lines_of(spec), self.bank, supply, overlap, self.dt)
+            begin = overlap(known.openings, trial_values(own, "deadband", known.deadband, self.count))
+            self.supplies = Supplies(lines_of(spec), self.bank, supply, begin, self.dt)
             self._line_gauges = LineGauges(readings, rngs, self.supplies.pressure, self.dt)
             self._sharing = FlowSharing(supplies_of(spec), self.supplies, self.law, n, self.dt)
         self.bill = EnergyBill(self.bank, supply, self.dt)
@@ -175,7 +177,7 @@ class MachineDrive:
             self.estimate = estimate._replace(sigma=nothing, feedback=nothing, answered=nothing)
             self.sigma.show(tick, estimate)
             # the learning of inertias depends on the valves
-            self.valves.step(self.demand.valve, self._seen, self.terms)
+            self.valves.step(opened(self.law.cylinders.openings, self.demand.valve), self._seen, self.terms)
             if tick and tick % round(0.5 / self.dt) == 0:  # fitted again every 0.5 s
                 self.valves.solve()
                 self.law.deadband[:], self.law.supply[:] = self.valves.compensated, self._supply_pressure()
@@ -243,7 +245,7 @@ class MachineDrive:
     def _watched(self, *, swing: bool = False, alarms: Collection[int] = ()) -> list[Broken]:
         if self.watch is None:
             return []
-        if not (self.watch.due(self.demand.valve) or alarms):
+        if not (self.watch.due(opened(self.law.cylinders.openings, self.demand.valve)) or alarms):
             return []
         seen = self._seen._replace(force=self.estimate.answered)
         found = self.watch.look(seen, self.terms, self._wanted, self.active, swing=swing, alarms=alarms)

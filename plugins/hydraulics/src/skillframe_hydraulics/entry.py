@@ -61,6 +61,8 @@ def told(spec: RobotSpec) -> tuple[list[str], dict[str, Any]]:
             f"  supply {name}: {one.kind.replace('_', '-')} pump of {6e4 * one.flow:.4g} l/min, line of"
             f" {1e3 * one.volume:.3g} l, feeds {', '.join(fed(spec, one))}"
         )
+        if one.compensation != "none":
+            lines[-1] += f", through {one.compensation}-compensated valves"
         returns = [float(a.known.get("return_pressure", 0.0)) for a in spec.actuation if a.joint in fed(spec, one)]
         if one.kind == "open_centre":
             wasted = one.flow * (one.centre_drop + max(returns, default=0.0))

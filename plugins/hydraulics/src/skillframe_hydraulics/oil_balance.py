@@ -9,8 +9,10 @@ import casadi as ca
 import numpy as np
 
 from skillframe.frames import Float
+from skillframe_hydraulics.compensation import held_range
 from skillframe_hydraulics.counterbalance import conductances, narrowing
 from skillframe_hydraulics.law.vdc_actuator import Cylinders, chamber_lengths
+from skillframe_hydraulics.lines import Lines
 from skillframe_hydraulics.symbolic_or_numeric import copysign, maximum, minimum
 
 
@@ -22,7 +24,8 @@ class Bounds:
         still: number of equal readings that mean a stopped sensor.
         sure: standard deviations of noise, exceeded once in 1e15.
         sunken: pressure below the return line's, whose check valve passes 1e-3 m3/s at 1e5 [Pa]; vacuum: gauge [Pa].
-        emptied: as sunken, of chambers that open centres let run empty [Pa]; filling: of a check valve [m3/(s Pa)].
+        emptied: as sunken, of chambers that open centres or compensated valves let run empty [Pa].
+        filling: of a check valve [m3/(s Pa)].
         moving: speed of a moving piston for noiseless sensors [m/s].
         window: checks per balance; lags: in checks, 20 to 60 ms, of which the shipped crane needs 20.
         floor, floor_in_swing: tolerated motion of the piston [m]; share: of the flow.
@@ -30,6 +33,7 @@ class Bounds:
             at the highest likely pressure, because early fits can be wrong by 16 bar with a small deviation [Pa].
         alike: share of another motion below which one is negligible.
         spread: standard deviations of supply and overlap.
+        loaded: opening of a valve whose load is surely sensed, share of its travel.
         setting: by which a counterbalance valve may open late or early [Pa].
         spool_floor, spool_share: for misplaced spools, motion [m] and share of the flow.
         excess, missed: s_1 and s_2 [m]; fast, slow: checks per sum of (3).
@@ -50,6 +54,7 @@ class Bounds:
     unsure: float = 1e6
     alike: float = 0.25
     spread: float = 2.0
+    loaded: float = 0.05
     setting: float = 1e6
     spool_floor: float = 1e-4
     spool_share: float = 0.1
@@ -83,7 +88,7 @@ class Knowledge(NamedTuple):
     ratio: Float
 
 
-def balance_function(c: Cylinders, period: float, open_centre: bool = False) -> ca.Function:
+def balance_function(c: Cylinders, period: float, lines: Lines | None = None) -> ca.Function:
     """A check of one machine with k cylinders: (1), the sums of (2), and whether the usual lag explains all.
 
     Inputs, (k,) each: mean command since the last check, pressures a and b, piston; the fields of `Knowledge`;
@@ -91,11 +96,13 @@ def balance_function(c: Cylinders, period: float, open_centre: bool = False) -> 
     Outputs: these with the new check first; volumes of both chambers, and their compressed part; 1 if all balances are
     explained; 1 if all spools may be in place.
 
-    Of open centres the command comes in two halves (2k,), means of its positive and of its negative part, as spools
-    change over within a period; and a chamber below the return line's pressure may fill through its check valve.
+    With `lines`, of open centres or compensated valves, the command comes in two halves (2k,), means of its positive
+    and of its negative part, as spools change over within a period; and a chamber below the return line's pressure may
+    fill through its check valve. The load that post-compensated valves hold is that of another valve which may be open,
+    for the ends of least flow, or which is open by `loaded` at least.
     """
     k, length = len(c.area_a), BOUNDS.length
-    given = [ca.SX.sym(f"given{i}", 2 * k if open_centre and i == 0 else k) for i in range(12)]
+    given = [ca.SX.sym(f"given{i}", 2 * k if lines is not None and i == 0 else k) for i in range(12)]
     valve, p_a, p_b, piston, *known, floor, spool_floor = given
     sums, readings = (ca.SX.sym(name, k, length * rows) for name, rows in (("sums", 10), ("readings", 3)))
     swung = Knowledge(*known)
@@ -107,10 +114,14 @@ def balance_function(c: Cylinders, period: float, open_centre: bool = False) -> 
     if own := c.counterbalance:
         check_a, check_b = np.maximum(check_a, own.holds_a), np.maximum(check_b, own.holds_b)
     checks = check_a, check_b
-    lines = supply - below, supply + above
-    halves = [_volumes(c, period, part, (p_a, p_b), lines, swung, checks) for part in ca.vertsplit(valve, k)]
-    volumes = halves[0] if not open_centre else [one + other for one, other in zip(*halves, strict=True)]
-    if open_centre:
+    ends = supply - below, supply + above
+    halves = ca.vertsplit(valve, k)
+    held: tuple[ca.SX | None, ca.SX | None] = (None, None)
+    if lines is not None and lines.compensated:
+        held = held_range(lines, halves, (p_a, p_b), ends, swung.most + BOUNDS.loaded)
+    parts = [_volumes(c, period, part, (p_a, p_b), ends, held, swung, checks) for part in halves]
+    volumes = parts[0] if lines is None else [one + other for one, other in zip(*parts, strict=True)]
+    if lines is not None:
         for i, pressure in ((2, p_a), (3, p_b), (6, p_a), (7, p_b)):  # the upper ends
             volumes[i] += period * BOUNDS.filling * maximum(c.return_pressure - pressure, 0.0)
     sizes = ca.horzcat(*map(ca.fabs, volumes[2:4]), *volumes)
@@ -131,16 +142,16 @@ def balance_function(c: Cylinders, period: float, open_centre: bool = False) -> 
 
 def _volumes(
     c: Cylinders, period: float, valve: ca.SX, pressures: tuple[ca.SX, ca.SX], lines: tuple[ca.SX, ca.SX],
-    swung: Knowledge, checks: tuple[Float, Float],
+    held: tuple[ca.SX | None, ca.SX | None], swung: Knowledge, checks: tuple[Float, Float],
 ) -> list[ca.SX]:  # fmt: skip
     """Lower and upper ends of (2) into both chambers, and both ends for the likely overlaps.
 
-    `lines` are the lowest and the highest likely pressure of the supply [Pa].
+    `lines` are the lowest and the highest likely pressure of the supply [Pa], `held` p_H with either.
     """
     p_a, p_b = pressures
     ends = {
         laminar: [
-            _edge(c, pressure, fills, lines[0] if laminar else lines[1], laminar, shares)
+            _edge(c, pressure, fills, lines[0 if laminar else 1], laminar, shares, held[0 if laminar else 1])
             for pressure, fills, shares in (
                 (p_a, valve > 0.0, (c.edge_pa, c.edge_at, checks[0])),
                 (p_b, valve <= 0.0, (c.edge_pb, c.edge_bt, checks[1])),
@@ -167,15 +178,19 @@ def _volumes(
 
 
 def _edge(
-    c: Cylinders, pressure: ca.SX, fills: ca.SX, supply: ca.SX, laminar: bool, shares: tuple[Float, Float, Float]
+    c: Cylinders, pressure: ca.SX, fills: ca.SX, supply: ca.SX, laminar: bool, shares: tuple[Float, Float, Float],
+    held: ca.SX | None = None,
 ) -> ca.SX:  # fmt: skip
     """Root of the pressure drop into a chamber from the supply, or out of it [sqrt(Pa)], optionally laminar.
 
     It is times the edge's share of the rated conductance, of `shares` for flow in and flow out. The third is 1 with a
     check valve.
     """
-    drop = ca.if_else(fills, supply - pressure, c.return_pressure - pressure)
-    shut = shares[2] * (pressure - supply) > 0.0
+    behind, check = pressure, shares[2]
+    if held is not None:
+        behind, check = maximum(pressure, held), maximum(check, held > pressure)
+    drop = ca.if_else(fills, supply - behind, c.return_pressure - pressure)
+    shut = check * (behind - supply) > 0.0
     share = ca.if_else(fills, ca.if_else(shut, 0.0, shares[0]), shares[1])
     if laminar:
         return share * (drop / ca.sqrt(ca.sqrt(drop * drop + c.laminar_pressure**2)))

@@ -22,66 +22,26 @@ z = B H s/V, a deviation is multiplied by 1/(1 + z) - z^2/(2 (1 + z)^2) in a ste
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from skillframe.fmu import Actuators
 from skillframe.frames import Float
 from skillframe.robot import RobotSpec
-from skillframe_hydraulics.declared import fed, supplies_of
+from skillframe_hydraulics.compensation import HELD, held_pressures, sensed
+from skillframe_hydraulics.declared import supplies_of
+from skillframe_hydraulics.lines import Lines, lines_of
 from skillframe_hydraulics.open_centre import bypass, conductance, narrowed
 
 NEEDED_IN, NEEDED_OUT = "supply_drop", ("flow_supply", "supply_slope")
 """Input and outputs of an actuator that is fed by a declared supply."""
-OPEN = 2e-3
-"""Opening of a valve, share of its travel, from which on a load-sensing pump senses the pressure of its chamber."""
 
 
-class Lines(NamedTuple):
-    """Figures of L supplies.
-
-    Attributes:
-        names: of the supplies; feeds: (L, k), 1 where an actuator is fed.
-        flow: Q_max (L,) [m3/s]; power: P, infinite if not limited [W]; margin: infinite unless load-sensing [Pa].
-        response: tau [s]; softness: V/B [m3/Pa].
-        drop: of open centres with all spools in their middle [Pa], 0 of other pumps; shut: x_C of open centres.
-        outlet: pressure of the return line, needed of open centres [Pa].
-    """
-
-    names: tuple[str, ...]
-    feeds: Float
-    flow: Float
-    power: Float
-    margin: Float
-    response: Float
-    softness: Float
-    drop: Float = np.zeros(1)
-    shut: Float = np.ones(1)
-    outlet: Float = np.zeros(1)
-
-    def most(self, pressure: Float) -> Float:
-        """Largest flow (N, L) [m3/s] at pressures (N, L)."""
-        return np.minimum(self.flow, self.power / np.maximum(pressure, 1e5))
-
-
-def lines_of(spec: RobotSpec) -> Lines:
-    """The supplies that robot.toml declares, checked before by `skillframe_hydraulics.declared`."""
-    declared = supplies_of(spec)
-    feeds: Float = np.array([[a.joint in fed(spec, one) for a in spec.actuation] for one in declared.values()], float)
-    each = list(declared.values())
-    bulk, outlet = (
-        feeds @ np.array([float(a.known[name]) for a in spec.actuation]) / feeds.sum(axis=1)
-        for name in ("bulk_modulus", "return_pressure")
-    )
-    return Lines(
-        tuple(declared), feeds, np.array([one.flow for one in each]),
-        np.array([np.inf if one.power is None else one.power for one in each]),
-        np.array([one.margin if one.kind == "load_sensing" else np.inf for one in each]),
-        np.array([one.response for one in each]), np.array([one.volume for one in each]) / bulk,
-        np.array([one.centre_drop if one.kind == "open_centre" else 0.0 for one in each]),
-        np.array([one.centre_shut for one in each]), outlet,
-    )  # fmt: skip
+def needed_by_lines(spec: RobotSpec) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Inputs and outputs of an actuator that a robot's supplies need."""
+    if not supplies_of(spec):
+        return (), ()
+    return (NEEDED_IN, *((HELD,) if lines_of(spec).compensated else ())), NEEDED_OUT
 
 
 class Supplies:
@@ -107,6 +67,11 @@ class Supplies:
         self._drop = bank.u[:, bank.inputs.index(NEEDED_IN)].reshape(count, k)  # a view
         columns = (*NEEDED_OUT, "spool", "pressure_a", "pressure_b")
         self._y = [bank.y[:, bank.outputs.index(name)].reshape(count, k) for name in columns]
+        self._holds = lines.compensated
+        if self._holds:
+            self._held = bank.u[:, bank.inputs.index(HELD)].reshape(count, k)
+            self._before = np.stack(self._y[2:])
+            self._fixed = lines.feeds[np.isfinite(lines.keeps)].any(axis=0)
         self._rated: Float = np.max(nominal[:, None] * lines.feeds, axis=-1)
         self._open = lines.drop > 0.0
         self._opens: Float = np.where(self._open, 1.0, 1.1) * self._rated
@@ -135,10 +100,20 @@ class Supplies:
         """Pressures (N, L) of the lines at their actuators (N, k), and `other` (N, k) where none is declared."""
         return np.where(self._is_fed, pressure[:, self._line], other)
 
+    def _holding(self, spool: Float, pressure_a: Float, pressure_b: Float) -> Float:
+        """p_H (N, k) of compensated valves, for the supply at the valves."""
+        at_valves, loads = self._nominal - self._drop, sensed(spool, self._deadband, pressure_a, pressure_b)
+        return np.stack(held_pressures(self.lines, [*loads.T], [*at_valves.T]), axis=-1)
+
     def _sums(self) -> tuple[Float, Float]:
-        """Flows taken from the lines, and their slopes (N, L)."""
+        """Flows taken from the lines at the step's end, and their slopes (N, L), p_H included."""
         fed = self.lines.feeds > 0.0  # an actuator that no line feeds may not tell its flow
-        taken, slope = (np.where(fed, each[:, None], 0.0).sum(axis=-1) for each in self._y[:2])
+        flow, steep = self._y[:2]
+        if self._holds:
+            governs = self._held > np.where(self._y[2] > 0.0, *self._y[3:])
+            flow = flow - np.where(governs, steep * (self._holding(*self._y[2:]) - self._held), 0.0)
+            steep = np.where(governs & self._fixed, 0.0, steep)
+        taken, slope = (np.where(fed, each[:, None], 0.0).sum(axis=-1) for each in (flow, steep))
         return taken, slope
 
     def _relieves(self, pressure: Float) -> tuple[Float, Float]:
@@ -158,8 +133,8 @@ class Supplies:
     def _wanted(self, taken: Float, pressure: Float) -> Float:
         """Q_w (N, L) within the pump's limits."""
         most = self.lines.most(pressure)
-        spool, pressure_a, pressure_b = self._y[2:]  # of the chambers that open valves feed, 0 with all shut
-        felt = np.where(np.abs(spool) - self._deadband > OPEN, np.where(spool > 0.0, pressure_a, pressure_b), 0.0)
+        spool, pressure_a, pressure_b = self._y[2:]
+        felt = sensed(spool, self._deadband, pressure_a, pressure_b)
         largest: Float = np.max(felt[:, None] * self.lines.feeds, axis=-1)
         target = np.minimum(largest + self.lines.margin, self._rated)
         gain = 0.5 * self.lines.softness / self.lines.response
@@ -176,6 +151,10 @@ class Supplies:
         self._middle: Float = 0.5 * (p + self._there)
         fallen = self._nominal - self.at_valves(self._middle, self._nominal)
         self._drop[...] = self._drop + fallen if lost else fallen
+        if self._holds:
+            now = np.stack(self._y[2:])
+            self._held[...] = self._holding(*(now + 0.5 * (now - self._before)))  # in the middle of the step
+            self._before = now
 
     def end(self) -> None:
         """Correct the pressures by what the actuators took."""

@@ -13,7 +13,7 @@ from skillframe_hydraulics.checks.figures import CYLINDER, completed
 from skillframe_hydraulics.cylinder.bank import instance_parameters
 from skillframe_hydraulics.declared import fed, supplies_of
 from skillframe_hydraulics.drive import holding_force
-from skillframe_hydraulics.supply import NEEDED_IN, NEEDED_OUT
+from skillframe_hydraulics.supply import NEEDED_IN, needed_by_lines
 
 
 def components(model: RobotModel) -> list[Component]:
@@ -35,8 +35,9 @@ def components(model: RobotModel) -> list[Component]:
         inputs = dict(a.inputs) or {name: name for name in INPUTS}
         outputs = dict(a.outputs) or {name: name for name in OUTPUTS}
         if a.joint in lines and usual:
-            inputs[NEEDED_IN] = NEEDED_IN
-            outputs |= {name: name for name in NEEDED_OUT}
+            needed = needed_by_lines(spec)
+            inputs |= {name: name for name in needed[0]}
+            outputs |= {name: name for name in needed[1]}
         line = lines.get(a.joint, a.joint)
         found.append(Component(
             name=a.joint, fmu=a.fmu, parameters=completed(a),

@@ -44,8 +44,9 @@ from skillframe_hydraulics.force.valve import ValveIdentification
 from skillframe_hydraulics.law.generated import Batch
 from skillframe_hydraulics.law.hydraulic import Measured, Reference, Terms
 from skillframe_hydraulics.law.hydraulic_compiled import CompiledLaw
-from skillframe_hydraulics.law.line_ahead import open_centres
+from skillframe_hydraulics.law.line_ahead import known_lines
 from skillframe_hydraulics.law.vdc_actuator import Cylinders
+from skillframe_hydraulics.lines import Lines
 from skillframe_hydraulics.oil_balance import BOUNDS, Knowledge, balance_function
 from skillframe_hydraulics.sensors import RECENT, MachineSensors
 
@@ -79,17 +80,18 @@ class ReadingWatch:
     """Checks the latest readings of N machines.
 
     `speed` (n,) are velocity limits of the coordinates, `returns` (k,) pressures of the return line [Pa], `moved` (k,)
-    the coordinate that each cylinder moves, `names` those of coordinates and cylinders.
+    the coordinate that each cylinder moves, `names` those of coordinates and cylinders, `empties` whether valves let
+    chambers run empty.
     """
 
     def __init__(
         self, noise: MachineNoise, speed: Float, returns: Float, moved: NDArray[np.int64],
-        names: tuple[tuple[str, ...], tuple[str, ...]], dt: float, open_centre: bool = False,
+        names: tuple[tuple[str, ...], tuple[str, ...]], dt: float, empties: bool = False,
     ) -> None:  # fmt: skip
         self._n, n, k = len(speed), len(speed), len(returns)
         self._names = [*names[0], *(f"pressure_{side} of {name}" for side in "ab" for name in names[1])]
         self._jump: Float = speed * dt + BOUNDS.sure * np.sqrt(2.0) * noise.encoder
-        sunken = BOUNDS.emptied if open_centre else BOUNDS.sunken
+        sunken = BOUNDS.emptied if empties else BOUNDS.sunken
         self._lowest: Float = np.tile(np.maximum(returns - sunken, BOUNDS.vacuum), 2)
         self._returns: Float = np.tile(returns, 2)
         self._quiet = np.repeat([noise.encoder == 0.0, noise.pressure == 0.0], [n, 2 * k])
@@ -139,7 +141,7 @@ class FlowWatch:
     Args:
         cylinders: nominal cylinders; names: of them. count: N; period: [s] between two checks.
         noise: standard deviation of an encoder's filtered reading [rad or m].
-        open_centre: whether a pump is of open centres, see `balance_function`.
+        lines: of open centres or compensated valves, see `balance_function`.
     """
 
     def __init__(
@@ -149,7 +151,7 @@ class FlowWatch:
         count: int,
         period: float,
         noise: float = 0.0,
-        open_centre: bool = False,
+        lines: Lines | None = None,
     ) -> None:
         self._names, self._period, k = names, period, len(names)
         self._area: Float = np.stack([cylinders.area_a, cylinders.area_b])[:, None]
@@ -158,14 +160,14 @@ class FlowWatch:
         """Cumulative sums of (2) into both chambers, latest first: sizes, both ends, and ends for likely overlaps."""
         self._seen: Float = np.zeros((count, self._length, 3, k))
         """Pistons and both pressures, latest first."""
-        self._given = [np.zeros((count, 2 * k if open_centre and i == 0 else k)) for i in range(12)]
+        self._given = [np.zeros((count, 2 * k if lines is not None and i == 0 else k)) for i in range(12)]
         self._taken, self._squeezed = (np.zeros((count, 2, k)) for _ in range(2))
         self._explained, self._everyone = np.zeros((count, 2)), np.arange(count)
         inputs = [*self._given, self._told, self._seen]
         after = [np.zeros_like(self._told), np.zeros_like(self._seen)]
         outputs = [*after, self._taken, self._squeezed, self._explained]
         carried = {0: len(inputs) - 2, 1: len(inputs) - 1}
-        self._balance = Batch(balance_function(cylinders, period, open_centre), inputs, outputs, carried=carried)
+        self._balance = Batch(balance_function(cylinders, period, lines), inputs, outputs, carried=carried)
         self._looks, self._running = 0, 0
         self._vague: NDArray[np.int64] = np.zeros((count, len(names)), dtype=np.int64)
         """Checks (N, k) for which the valve flow remains unknown."""
@@ -287,21 +289,22 @@ class MachineWatch:
     ) -> None:  # fmt: skip
         chain, period, count = law.chain, RECENT * dt, gauges.raw.shape[1]
         self._law, self._valves, self._gauges, self._tick = law, valves, gauges, 0
-        self._open_centre = open_centres(chain.robot.spec) is not None
+        lines = known_lines(chain.robot.spec)
+        self._halves = lines is not None
         speed = chain.minimal(chain.model.velocityLimit)
         speed = np.where(np.isfinite(speed), speed, valve_speeds(chain, cylinders, moved))
         names = (tuple(chain.independent), tuple(chain.actuated))
-        self._readings = ReadingWatch(noise, speed, cylinders.return_pressure, moved, names, dt, self._open_centre)
+        self._readings = ReadingWatch(noise, speed, cylinders.return_pressure, moved, names, dt, self._halves)
         # white noise behind w^2 / (s + w)^2 has a variance w dt / 4 times as large
         filtered = noise.encoder * float(np.sqrt(0.5 * np.pi * noise.corner_hz * dt))
-        self._flow = FlowWatch(cylinders, names[1], count, period, filtered, self._open_centre)
+        self._flow = FlowWatch(cylinders, names[1], count, period, filtered, lines)
         self._tool = ToolWatch(count, period, law.at.tip.shape[1])
-        self._told: Float = np.zeros((count, (2 if self._open_centre else 1) * len(names[1])))
+        self._told: Float = np.zeros((count, (2 if self._halves else 1) * len(names[1])))
         self._known, self._swinging = knowledge(law, valves), True
 
     def due(self, valve: Float) -> bool:
-        """Add the command (N, k) of a tick. Returns whether a full check is due."""
-        self._told += np.hstack([np.maximum(valve, 0.0), np.minimum(valve, 0.0)]) if self._open_centre else valve
+        """Add the openings (N, k) that a tick commands. Returns whether a full check is due."""
+        self._told += np.hstack([np.maximum(valve, 0.0), np.minimum(valve, 0.0)]) if self._halves else valve
         self._tick += 1
         return self._tick % RECENT == 0
 

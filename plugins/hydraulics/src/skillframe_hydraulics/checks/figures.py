@@ -20,6 +20,7 @@ from skillframe.robot import Actuation, Limits, RobotModel, published_inertia
 from skillframe_hydraulics.checks.plausible import CYLINDER_RULES, MACHINE_RULES, Doubt, doubts
 from skillframe_hydraulics.counterbalance import DEFAULTS
 from skillframe_hydraulics.declared import noise_of
+from skillframe_hydraulics.opening import PARAMETERS, WRITE_OPENING, points_of, wrong
 
 CYLINDER = "hydraulic_cylinder"
 SHAPE = ("bore", "rod", "stroke")
@@ -30,7 +31,7 @@ NEEDED = (
 """Figures that the controller needs of a cylinder."""
 EDGES = ("edge_pa", "edge_pb", "edge_at", "edge_bt")
 SWITCHES = ("rated_drop_is_per_edge", "feed_check")
-OPTIONAL = ("laminar_pressure", "deadband", "presliding_length", *SWITCHES, *EDGES, *DEFAULTS)
+OPTIONAL = ("laminar_pressure", "deadband", "presliding_length", *SWITCHES, *EDGES, *DEFAULTS, *PARAMETERS)
 """Figures that the controller uses, with defaults."""
 _OURS = frozenset((*NEEDED, *OPTIONAL, "displacement"))
 POSITIVE = frozenset({
@@ -111,6 +112,8 @@ def unfit_figures(actuation: Actuation) -> list[Unfit]:
     if not found:
         if p.get("counterbalance_a") and p.get("counterbalance_b"):
             found.append(Unfit(f"{of} has a counterbalance valve at either port", "give that of the loaded port alone"))
+        if (points := points_of(p)) and (text := wrong(points, p.get("deadband"))):
+            found.append(Unfit(f"opening of {of} {text}", WRITE_OPENING))
         for small, large in (("rod", "bore"), ("return_pressure", "supply_pressure")):
             if large in p and not p.get(small, 0.0) < p[large]:
                 text = f"{of} has {small} {p[small]:g}, not below its {large} {p[large]:g}"

@@ -12,8 +12,8 @@ from skillframe_hydraulics.checks.figures import Unfit, areas
 from skillframe_hydraulics.declared import supplies_of
 from skillframe_hydraulics.force.calibration import CALIBRATION_S, swing
 from skillframe_hydraulics.law.vdc_reference import ToolTask
+from skillframe_hydraulics.lines import lines_of
 from skillframe_hydraulics.sharing import SharingSettings
-from skillframe_hydraulics.supply import lines_of
 
 LEAST = 0.2
 """Of the swing's size: 20 mm to each side, four times what seals and encoders leave unknown."""

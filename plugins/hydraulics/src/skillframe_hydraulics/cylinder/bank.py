@@ -26,10 +26,12 @@ from skillframe.robot import Actuation, RobotSpec
 from skillframe_hydraulics.checks.figures import CYLINDER, completed
 
 
-def banks(spec: RobotSpec, trials: int, ports: Sequence[str] = (), *, lines: Sequence[str] = ()) -> Actuators:
+def banks(
+    spec: RobotSpec, trials: int, ports: Sequence[str] = (), *, lines: tuple[Sequence[str], Sequence[str]] = ((), ())
+) -> Actuators:  # fmt: skip
     """A bank of a robot's actuators, the last one again if it fits, since opening FMUs takes tenths of a second.
 
-    `ports` are inputs that faults need, `lines` outputs that supply lines need.
+    `ports` are inputs that faults need, `lines` inputs and outputs that supply lines need.
 
     Raises:
         InputError, UnknownName, MissingDependency, InstanceFailed: an actuator cannot be opened.
@@ -41,12 +43,12 @@ def banks(spec: RobotSpec, trials: int, ports: Sequence[str] = (), *, lines: Seq
             text = f"its FMU has no input for {' and '.join(lacking)}, so that it cannot break so"
             cure = "map one under inputs of its [[actuation]], or leave it out"
             raise InputError(f"robot {spec.name}, {own.name}", text, cure)
-        fed = bool(lines) and own.fmu == CYLINDER  # another maker's maps what a line needs, or no line feeds it
-        needed = {*ports, "supply_drop"} if fed else {*ports}
+        fed = bool(lines[0]) and own.fmu == CYLINDER  # another maker's maps what a line needs, or no line feeds it
+        needed = {*ports, *lines[0]} if fed else {*ports}
         mapped = {name: name for name in (*(() if own.inputs else INPUTS), *sorted(needed))}
         own = replace(own, inputs={**mapped, **own.inputs}) if needed else own
         if fed:
-            shown = {name: name for name in (*(() if own.outputs else OUTPUTS), *lines)}
+            shown = {name: name for name in (*(() if own.outputs else OUTPUTS), *lines[1])}
             own = replace(own, outputs={**shown, **own.outputs})
         specs.append(own)
     return kept((str(spec.folder), repr(specs), trials), lambda: open_cylinders(specs, trials, spec.folder))

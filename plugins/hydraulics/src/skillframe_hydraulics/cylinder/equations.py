@@ -37,7 +37,7 @@ class PistonMotion(NamedTuple):
     """Inputs of the oil's equations at an instant.
 
     Piston position [m] and velocity [m/s], spool command [-1, 1], areas of holes in the hoses [m^2], pressure lost
-    before the valve [Pa].
+    before the valve [Pa], pressure that a compensator holds behind the edge from the supply [Pa], 0 without one.
     """
 
     position: Float
@@ -46,6 +46,7 @@ class PistonMotion(NamedTuple):
     burst_a: Float | float = 0.0
     burst_b: Float | float = 0.0
     supply_drop: Float | float = 0.0
+    held_pressure: Float | float = 0.0
 
 
 class Flows(NamedTuple):
@@ -72,6 +73,13 @@ def derive(values: dict[str, Any]) -> SimpleNamespace:
     p.counterbalance_edge = p.counterbalance_flow / np.sqrt(p.counterbalance_drop)
     p.holds_a, p.holds_b = (np.where(x > 0, 1.0, 0.0) for x in (p.counterbalance_a, p.counterbalance_b))
     p.has_counterbalance = bool(np.any(p.holds_a + p.holds_b > 0))
+    p.has_points = bool(np.any(p.opening_points > 0))
+    for i in range(1, 8):  # behind the last point travel and opening are 1
+        for name in (f"travel_{i + 1}", f"opening_{i + 1}"):
+            setattr(p, name, np.where(p.opening_points > i, getattr(p, name), 1.0))
+        width = getattr(p, f"travel_{i + 1}") - getattr(p, f"travel_{i}")
+        rise = getattr(p, f"opening_{i + 1}") - getattr(p, f"opening_{i}")
+        setattr(p, f"steep_{i}", np.where(width > 0.0, rise / np.where(width > 0.0, width, 1.0), 0.0))
     p.has_air, p.has_cushion = bool(np.any(p.air_fraction > 0)), bool(np.any(p.cushion_length > 0))
     p.has_stribeck = bool(np.any(p.static_friction > p.coulomb_friction))
     return p
@@ -102,10 +110,17 @@ def bulk_modulus(pressure: Float, p: SimpleNamespace) -> Float:
     return result
 
 
-def opening(spool: Float, deadband: Float) -> Float:
+def opening(p: SimpleNamespace, spool: Float) -> Float:
     """Eq. 2: opening of the edges from the spool's position, -1 to 1, zero within the overlap."""
     x = clip(spool, -1.0, 1.0)
-    result: Float = copysign(maximum(absolute(x) - deadband, 0.0) / (1.0 - deadband), x)
+    plain: Float = copysign(maximum(absolute(x) - p.deadband, 0.0) / (1.0 - p.deadband), x)
+    if not p.has_points:
+        return plain
+    total = 0.0 * x
+    for i in range(1, 8):
+        start, end = getattr(p, f"travel_{i}"), getattr(p, f"travel_{i + 1}")
+        total = total + getattr(p, f"steep_{i}") * clip(absolute(x) - start, 0.0, end - start)
+    result: Float = where(p.opening_points > 0.0, copysign(total, x), plain)
     return result
 
 
@@ -120,21 +135,24 @@ def _throttled(conductance: Float, room: Float, drop: Float, p: SimpleNamespace)
     return result
 
 
-def valve_flows(p: SimpleNamespace, spool: Float, pa: Float, pb: Float, ps: Float, position: Float) -> Flows:
-    """Eq. 3: flows of the four edges: a positive spool connects supply to a and b to return."""
-    u = p.edge * opening(spool, p.deadband)
+def valve_flows(
+    p: SimpleNamespace, spool: Float, pa: Float, pb: Float, ps: Float, position: Float, held: Float | float = 0.0
+) -> Flows:
+    """Eq. 3: flows of the four edges: a positive spool connects supply to a and b to return. `held`: eq. 14."""
+    u = p.edge * opening(p, spool)
     extend, retract = maximum(u, 0.0), maximum(-u, 0.0)
     drop_a, drop_b, tr = pa - p.return_pressure, pb - p.return_pressure, p.laminar_pressure
     open_a, open_b = p.edge_pa * extend, p.edge_pb * retract
     check_a = check_b = p.feed_check
     if p.has_counterbalance:  # each has a check valve
         check_a, check_b = maximum(check_a, p.holds_a), maximum(check_b, p.holds_b)
+    behind_a, behind_b = (where(held * (held > pressure) > 0.0, held, pressure) for pressure in (pa, pb))
     open_a, open_b = (
-        opened * where(check * (pressure - ps) > 0.0, 0.0, 1.0)
-        for opened, check, pressure in ((open_a, check_a, pa), (open_b, check_b, pb))
+        opened * where(maximum(check, 1.0 * (behind > pressure)) * (behind - ps) > 0.0, 0.0, 1.0)
+        for opened, check, behind, pressure in ((open_a, check_a, behind_a, pa), (open_b, check_b, behind_b, pb))
     )
-    into_a, into_b = open_a * edge_flow(ps - pa, tr), open_b * edge_flow(ps - pb, tr)
-    slope = open_a * edge_slope(ps - pa, tr) + open_b * edge_slope(ps - pb, tr)
+    into_a, into_b = open_a * edge_flow(ps - behind_a, tr), open_b * edge_flow(ps - behind_b, tr)
+    slope = open_a * edge_slope(ps - behind_a, tr) + open_b * edge_slope(ps - behind_b, tr)
     wide_a = _throttled(p.edge_at * retract, position, drop_a, p)
     wide_b = _throttled(p.edge_bt * extend, p.stroke - position, drop_b, p)
     if p.has_counterbalance:
@@ -219,7 +237,8 @@ def volumes(p: SimpleNamespace, position: Float) -> tuple[Float, Float]:
 def pressure_rates(p: SimpleNamespace, y: Float, motion: PistonMotion) -> Float:
     """Eq. 4: rates of the pressures (2, n) [Pa/s]."""
     pa, pb = y[2], y[3]
-    flows = valve_flows(p, y[0], pa, pb, p.supply_pressure - motion.supply_drop, motion.position)
+    supply = p.supply_pressure - motion.supply_drop
+    flows = valve_flows(p, y[0], pa, pb, supply, motion.position, motion.held_pressure)
     leak = p.leakage * (pa - pb)
     burst_a, burst_b = burst_flow(p, motion.burst_a, pa), burst_flow(p, motion.burst_b, pb)
     if p.has_counterbalance:

@@ -17,7 +17,9 @@ import numpy as np
 from skillframe_hydraulics.cylinder import equations as eq
 from skillframe_hydraulics.symbolic_or_numeric import absolute, ceil, clip, expm1, maximum, minimum, sqrt, stack, where
 
-GIVEN = ("command", "position", "velocity", "acceleration", "burst_a", "burst_b", "supply_drop", "step")
+GIVEN = (
+    "command", "position", "velocity", "acceleration", "burst_a", "burst_b", "supply_drop", "held_pressure", "step",
+)  # fmt: skip
 STEP = GIVEN.index("step")
 MEMORY = ("target", "demand", "force_mean", "work")
 STAGE = (
@@ -41,17 +43,18 @@ class _Motion(NamedTuple):
     target: Any
     demand: Any
     slew: Any
-    faults: tuple[Any, Any, Any]
+    outside: tuple[Any, Any, Any, Any]
 
     def at(self, t: Any) -> eq.PistonMotion:
         limit = where(self.slew > 0, self.slew * t, np.inf)
         demand = self.demand + clip(self.target - self.demand, -limit, limit)
         x, v, a = self.position, self.velocity, self.acceleration
-        return eq.PistonMotion(x + t * (v + 0.5 * a * t), v + a * t, demand, *self.faults)
+        return eq.PistonMotion(x + t * (v + 0.5 * a * t), v + a * t, demand, *self.outside)
 
 
 def _motion(p: SimpleNamespace, memory: Vector, given: Vector, target: Any) -> _Motion:
-    return _Motion(given[1], given[2], given[3], target, memory[1], p.spool_slew, (given[4], given[5], given[6]))
+    outside = given[4], given[5], given[6], given[7]
+    return _Motion(given[1], given[2], given[3], target, memory[1], p.spool_slew, outside)
 
 
 def begin(p: SimpleNamespace, y: Vector, memory: Vector, given: Vector) -> Vector:
@@ -92,14 +95,14 @@ def finish(p: SimpleNamespace, stage: Vector, memory: Vector, given: Vector) -> 
     """RESULT of a step: states, MEMORY, and SHOWN at the end of the motion."""
     end = _motion(p, memory, given, stage[16]).at(given[STEP])
     new = stack([stage[16], end.demand, stage[14] / given[STEP], stage[15]])
-    shown = show(p, stage[0:5], new, stack([given[0], end.position, end.velocity, 0.0, 0.0, 0.0, given[6]]))
+    shown = show(p, stage[0:5], new, stack([given[0], end.position, end.velocity, 0.0, 0.0, 0.0, given[6], given[7]]))
     return stack([*_rows(stage, 5), *_rows(new, 4), *_rows(shown, len(SHOWN))])
 
 
 def show(p: SimpleNamespace, y: Vector, memory: Vector, given: Vector) -> Vector:
-    """SHOWN at states y, and at position, velocity and supply_drop of GIVEN."""
+    """SHOWN at states y, and at position, velocity, supply_drop and held_pressure of GIVEN."""
     position, velocity = given[1], given[2]
-    flows = eq.valve_flows(p, y[0], y[2], y[3], p.supply_pressure - given[6], position)
+    flows = eq.valve_flows(p, y[0], y[2], y[3], p.supply_pressure - given[6], position, given[7])
     force, friction = eq.piston_force(p, y, position, velocity), eq.friction_force(p, y[4], velocity)
     return stack(
         [force, memory[2], memory[3], y[2], y[3], flows.a, flows.b, y[0], flows.supply, flows.supply_slope, friction]
@@ -116,7 +119,7 @@ def _count(p: SimpleNamespace, y: Vector, motion: eq.PistonMotion, rates: Vector
     supply = p.supply_pressure - motion.supply_drop
     to_supply = minimum(absolute(supply - pa), absolute(supply - pb))
     least = minimum(to_supply, minimum(absolute(pa - low), absolute(pb - low))) + p.laminar_pressure
-    wide = maximum(absolute(eq.opening(y[0], p.deadband)), absolute(eq.opening(motion.demand, p.deadband)))
+    wide = maximum(absolute(eq.opening(p, y[0])), absolute(eq.opening(p, motion.demand)))
     soon_a, soon_b = 2.0 * step * absolute(rates[2]), 2.0 * step * absolute(rates[3])
     widest = maximum(maximum(p.edge_pa, p.edge_pb), maximum(p.edge_at, p.edge_bt))
     slope = p.edge * widest * wide / sqrt(least) + p.leakage

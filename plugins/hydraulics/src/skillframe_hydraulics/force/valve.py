@@ -116,7 +116,7 @@ class ValveIdentification:
         return np.clip(self.overlap - self.overlap_deviation, 0.0, self.settings.largest)
 
     def step(self, valve: Float, measured: Measured, terms: Terms) -> None:
-        """Add a sample: the last valve commands (N, k), and the measurement."""
+        """Add a sample: the openings (N, k) that were last commanded, and the measurement."""
         self._told += valve
         self._tick += 1
         if self._tick % self._slice == 0:

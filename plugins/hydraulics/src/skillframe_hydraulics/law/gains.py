@@ -25,6 +25,7 @@ from skillframe_hydraulics.declared import gains_of, noise_of, with_gains
 from skillframe_hydraulics.force.damped import noise_passed
 from skillframe_hydraulics.law.hydraulic import HydraulicGains, tool_task
 from skillframe_hydraulics.law.vdc_actuator import Cylinders, cylinders
+from skillframe_hydraulics.lines import kept_drops
 
 __all__ = ["derived_gains", "law_gains", "missing_gains", "with_derived_gains"]
 
@@ -142,7 +143,8 @@ def _valve_noise(c: Cylinders, state: ChainState, velocity: Float, body: float, 
         RATE / c.bulk_modulus * forces,
     ]
     length_a, length_b = c.arm_a + 0.5 * c.stroke, c.arm_b + 0.5 * c.stroke
-    middle = np.minimum(c.edge_pa / length_a + c.edge_bt / length_b, c.edge_at / length_a + c.edge_pb / length_b)
-    drop = np.sqrt(0.5 * (c.supply_pressure - c.return_pressure))
-    noise: Float = norm(np.array(size, dtype=float).T) / (c.edge * drop * middle)
+    half = 0.5 * (c.supply_pressure - c.return_pressure)
+    into_a, into_b = (np.sqrt(kept_drops(spec) / half).clip(max=1.0) * edge for edge in (c.edge_pa, c.edge_pb))
+    middle = np.minimum(into_a / length_a + c.edge_bt / length_b, c.edge_at / length_a + into_b / length_b)
+    noise: Float = norm(np.array(size, dtype=float).T) / (c.edge * np.sqrt(half) * middle)
     return noise

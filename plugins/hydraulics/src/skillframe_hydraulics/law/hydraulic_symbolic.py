@@ -18,23 +18,24 @@ from skillframe.robot import ClosedChain, published_inertia
 from skillframe.signals import rate_after
 from skillframe_hydraulics.counterbalance import counterbalances
 from skillframe_hydraulics.law.generated import dense_function, matrix_symbol
-from skillframe_hydraulics.law.line_ahead import inverse_ahead, open_centres
+from skillframe_hydraulics.law.line_ahead import inverse_ahead, known_lines
 from skillframe_hydraulics.law.symbolic_chain import Expression, SymbolicChain, closing_function, constant
 from skillframe_hydraulics.law.vdc_actuator import (
     CYLINDER,
     ContactFriction,
     CylinderGains,
     Cylinders,
-    across_deadband,
     bristle_after,
     coulomb_shape,
     flow_demand,
     inverse_valve,
     pressure_force,
+    spool_for,
 )
 from skillframe_hydraulics.law.vdc_adaptation import adapt
 from skillframe_hydraulics.law.vdc_body import PARAMETERS, kinetic_energy, needed_forces
 from skillframe_hydraulics.law.vdc_reference import required_motion, swung_by
+from skillframe_hydraulics.opening import openings
 from skillframe_hydraulics.symbolic_or_numeric import clip
 
 _KEPT: dict[tuple[Any, ...], tuple[ca.Function, ca.Function, ca.Function]] = {}
@@ -48,8 +49,8 @@ def functions(chain: ClosedChain, axes: Float) -> tuple[ca.Function, ca.Function
     chosen = (chain.driven, chain.dependent, chain.free, chain.rows, chain.coupling, chain.offsets, axes)
     key = (
         chain.model.saveToString(), chain.robot.tool_frames[0], chain.steered, *(each.tobytes() for each in chosen),
-        chain.loops, repr(counterbalances(chain.robot.spec.actuation)),
-        *(each.tobytes() for each in (open_centres(chain.robot.spec) or ((),))[1:]),
+        chain.loops, repr([find(chain.robot.spec.actuation) for find in (counterbalances, openings)]),
+        *(each.tobytes() for each in (known_lines(chain.robot.spec) or ((),))[1:]),
         published_inertia(chain.robot.spec).com if chain.robot.spec.payload else None,
     )  # fmt: skip
     if key not in _KEPT:
@@ -132,8 +133,9 @@ def law_function(chain: ClosedChain, axes: Float) -> ca.Function:
     rub_bounds = [matrix_symbol(f"friction_{name}", 2, k) for name in ("lower", "upper")]
     table, cylinder = matrix_symbol("cylinder", len(CYLINDER), k)
     k_x, k_f, deadband, supply = (ca.SX.sym(name, k) for name in ("k_x", "k_f", "deadband", "supply"))
-    valves = counterbalances(chain.robot.spec.actuation)
-    c = Cylinders(**{name: cylinder[i, :].T for i, name in enumerate(CYLINDER)}, counterbalance=valves)
+    valves, points = counterbalances(chain.robot.spec.actuation), openings(chain.robot.spec.actuation)
+    fields = {name: cylinder[i, :].T for i, name in enumerate(CYLINDER)}
+    c = Cylinders(**fields, counterbalance=valves, openings=points)
 
     tip = constant(axes) @ s.frame(chain.robot.tool_frames[0]).origin
     hung = tip if not swung_by(chain) else _hung(s, rows, tip)
@@ -162,12 +164,12 @@ def law_function(chain: ClosedChain, axes: Float) -> ca.Function:
     value, slope = rate_after(value, slope, f_pr, 2.0 * np.pi * gain["corner"], gain["dt"])
     gains = CylinderGains(velocity=k_x, force=k_f)
     demand = flow_demand(c, gains, (piston, speed, speed_r), (f_pr, slope), (p_a, p_b))
-    lines = open_centres(chain.robot.spec)
+    lines = known_lines(chain.robot.spec)
     if lines is None:
         opened = inverse_valve(c, demand, piston, (p_a, p_b), supply)
     else:
         opened = inverse_ahead(lines, c, (demand, piston, speed, speed_r), (p_a, p_b), supply, deadband)
-    valve = clip(across_deadband(deadband, opened), -1.0, 1.0)
+    valve = clip(spool_for(c, deadband, opened), -1.0, 1.0)
     lower, upper = (b[1] for b in bounds)
     learned = adapt(rows, gain["adaptation"] * ca.horzcat(*drive).T, (lower, upper), gain["dt"])
     speeds = ca.vertcat(gain["coulomb"], gain["viscous"])

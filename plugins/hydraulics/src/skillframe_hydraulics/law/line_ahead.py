@@ -20,11 +20,13 @@ import casadi as ca
 import numpy as np
 
 from skillframe.robot import RobotSpec
+from skillframe_hydraulics.compensation import held_pressures, sensed
 from skillframe_hydraulics.cylinder.equations import edge_flow
 from skillframe_hydraulics.declared import supplies_of
-from skillframe_hydraulics.law.vdc_actuator import across_deadband, chamber_lengths, inverse_valve
+from skillframe_hydraulics.law.vdc_actuator import chamber_lengths, inverse_valve, spool_for
+from skillframe_hydraulics.lines import Lines, lines_of
 from skillframe_hydraulics.open_centre import bypass, conductance, narrowed
-from skillframe_hydraulics.supply import Lines, lines_of
+from skillframe_hydraulics.opening import overlap
 from skillframe_hydraulics.symbolic_or_numeric import clip, maximum, minimum, where
 
 AHEAD_S = 0.05
@@ -42,10 +44,10 @@ EMPTY = 0.5e5
 makes no force, and the piston's motion takes none."""
 
 
-def open_centres(spec: RobotSpec) -> Lines | None:
-    """The supplies of a robot if one is of open centres, else None."""
+def known_lines(spec: RobotSpec) -> Lines | None:
+    """The supplies of a robot if one is of open centres or has compensated valves, else None."""
     lines = lines_of(spec) if supplies_of(spec) else None
-    return lines if lines is not None and np.any(lines.drop > 0.0) else None
+    return lines if lines is not None and (lines.compensated or np.any(lines.drop > 0.0)) else None
 
 
 def checked(c: Any, drop: Any) -> Any:
@@ -64,7 +66,7 @@ def inverse_ahead(
     """Unlimited openings u_e (k,) as of `inverse_valve`, at the roots of (1) of lines of open centres.
 
     `motion` is flow demand, piston position, velocity and required velocity; `supply` (k,) are measured pressures at
-    the valves, at which those of other pumps are inverted.
+    the valves, at which those of other pumps are inverted, compensated ones with the p_H of `held_pressures`.
     """
     (demand, x, moved, speed), (p_a, p_b) = motion, pressures
     opened = inverse_valve(c, demand, x, pressures, supply)
@@ -72,6 +74,15 @@ def inverse_ahead(
     length_a, length_b = chamber_lengths(c, x)
     demand -= empty_a * c.area_a / length_a * maximum(moved, 0.0) + empty_b * c.area_b / length_b * minimum(moved, 0.0)
     pushing = replace(c, edge_pa=c.edge_pa * (1.0 - empty_a), edge_pb=c.edge_pb * (1.0 - empty_b))
+    if lines.compensated:
+        spool = spool_for(c, deadband, inverse_valve(pushing, demand, x, pressures, supply))
+        loads = ca.vertsplit(
+            sensed(spool, overlap(c.openings, deadband), *pressures)
+        )  # of the valves that open, without compensators
+        held = ca.vertcat(*held_pressures(lines, loads, ca.vertsplit(supply)))
+        kept = inverse_valve(pushing, demand, x, pressures, supply, held=held)
+        fed = ca.DM(lines.feeds[lines.compensates].any(axis=0))
+        opened = fed * kept + (1.0 - fed) * opened
     demand = demand * clip(ca.fabs(speed) / BEGIN - 1.0, 0.0, 1.0)
     for i in np.flatnonzero(lines.drop > 0.0).tolist():
         fed, outlet = ca.DM(lines.feeds[i]), lines.outlet[i]
@@ -81,7 +92,7 @@ def inverse_ahead(
         for _ in range(ROUNDS):
             p = 0.5 * (low + high)
             u = inverse_valve(pushing, demand, x, pressures, p, checked, drained)
-            narrowing = narrowed(clip(across_deadband(deadband, u), -1.0, 1.0), lines.shut[i])
+            narrowing = narrowed(clip(spool_for(c, deadband, u), -1.0, 1.0), lines.shut[i])
             into = where(demand > 0.0, c.edge_pa * checked(c, p - p_a), c.edge_pb * checked(c, p - p_b))
             taken = ca.dot(fed, c.edge * minimum(ca.fabs(u), 1.0) * into)
             through, _ = bypass(centre, ca.dot(fed, narrowing) / count, p - outlet)

@@ -35,6 +35,7 @@ from skillframe.frames import Float
 from skillframe.robot import Actuation
 from skillframe_hydraulics.checks.figures import EDGES, NEEDED, SHAPE, areas, is_motor, require_known
 from skillframe_hydraulics.counterbalance import Counterbalance, conductances, counterbalances, narrowing
+from skillframe_hydraulics.opening import ACROSS, Openings, openings, travel
 from skillframe_hydraulics.symbolic_or_numeric import (
     absolute,
     copysign,
@@ -47,7 +48,6 @@ from skillframe_hydraulics.symbolic_or_numeric import (
     where,
 )
 
-ACROSS = 2e-3  # w, share of the valve's travel
 ROUNDS = 5  # of Newton's rule; 2e-5 of the flow are then missing at most, for edges that differ a hundredfold
 
 
@@ -64,6 +64,7 @@ class Cylinders:
             is 0; what is in m, m/s and N of a cylinder is in rad, rad/s and Nm.
         presliding_length: z_ss [m].
         counterbalance: their counterbalance valves, None if there are none.
+        openings: points of their valves' opening over the travel, None if there are none.
     """
 
     area_a: Float
@@ -88,9 +89,10 @@ class Cylinders:
     edge_bt: Float
     feed_check: Float
     counterbalance: Counterbalance | None = None
+    openings: Openings | None = None
 
 
-CYLINDER = tuple(name for name in Cylinders.__dataclass_fields__ if name != "counterbalance")
+CYLINDER = tuple(name for name in Cylinders.__dataclass_fields__ if name not in ("counterbalance", "openings"))
 """Fields that are arrays (n,)."""
 
 
@@ -128,7 +130,7 @@ def cylinders(actuation: Sequence[Actuation], where: object = "robot.toml") -> C
         **{name: p[name] for name in (*kept, *pressures)},
         **{name: np.array([row.get(name, 1.0) for row in rows], dtype=float) for name in EDGES},
         feed_check=np.array([row.get("feed_check", 0.0) for row in rows], dtype=float),
-        counterbalance=counterbalances(actuation),
+        counterbalance=counterbalances(actuation), openings=openings(actuation),
     )  # fmt: skip
 
 
@@ -194,15 +196,18 @@ def inverse_valve(
     supply: Any = None,
     root: Callable[..., Any] = least_root,
     out: Callable[..., Any] = least_root,
+    held: Any = None,
 ) -> Any:
     """Unlimited opening u_e (..., n) of the edges for the flow demand, at the supply p_S or the nominal one.
 
-    `root` and `out` are those of the drops from the supply and to the return line, of `c` and drops.
+    `root` and `out` are those of the drops from the supply and to the return line, of `c` and drops. `held` is p_H of
+    compensated valves, see `skillframe_hydraulics.compensation`.
     """
     (p_a, p_b), high = pressures, c.supply_pressure if supply is None else supply
+    behind_a, behind_b = (p_a, p_b) if held is None else (maximum(p_a, held), maximum(p_b, held))
     a, b = (1.0 / length for length in chamber_lengths(c, x))
-    into_a, out_b = c.edge_pa * root(c, high - p_a) * a, c.edge_bt * out(c, p_b - c.return_pressure) * b
-    into_b, out_a = c.edge_pb * root(c, high - p_b) * b, c.edge_at * out(c, p_a - c.return_pressure) * a
+    into_a, out_b = c.edge_pa * root(c, high - behind_a) * a, c.edge_bt * out(c, p_b - c.return_pressure) * b
+    into_b, out_a = c.edge_pb * root(c, high - behind_b) * b, c.edge_at * out(c, p_a - c.return_pressure) * a
     opened = demand / (c.edge * where(demand > 0.0, into_a + out_b, into_b + out_a))
     if c.counterbalance is None:
         return opened
@@ -219,3 +224,8 @@ def inverse_valve(
 def across_deadband(deadband: Any, opening: Any) -> Any:
     """Command u (..., n) for an opening u_e of a valve with overlap b."""
     return (1.0 - deadband) * opening + deadband * tanh(opening / ACROSS)
+
+
+def spool_for(c: Any, deadband: Any, opening: Any) -> Any:
+    """Command u (..., n) for an opening u_e, through `skillframe_hydraulics.opening`."""
+    return travel(c.openings, across_deadband(deadband, opening))
