@@ -100,7 +100,7 @@ def one_system(lines, end, own, commands=COMMANDS):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("lines", [PRE, POST])
-@pytest.mark.parametrize("litres", [20.0, pytest.param(5.0, marks=pytest.mark.figures)])
+@pytest.mark.parametrize("litres", [5.0, pytest.param(20.0, marks=pytest.mark.figures)])
 def test_compensated_cylinders_and_line_are_one_integration_of_all_within_a_tenth_of_a_bar_and_of_a_millimetre(
     lines, litres
 ):

@@ -18,6 +18,7 @@ from tests.excavator import write_excavator
 
 EXAMPLE = checkout() / "docs" / "how-to" / "excavator"
 PUMP = '\n[supply.main]\nflow = "160 l/min"\nvolume = "20 l"\n'
+POST = f'{PUMP}kind = "load_sensing"\ncompensation = "post"\n'
 H = 1e-3
 
 
@@ -69,7 +70,8 @@ class Recording:
 
 
 @pytest.mark.slow
-def test_a_second_master_gives_the_traces_of_a_run_to_a_millionth(tmp_path, compiler, monkeypatch):
+@pytest.mark.parametrize("pump", [PUMP, pytest.param(POST, marks=pytest.mark.figures)], ids=["constant", "compensated"])
+def test_a_second_master_gives_the_traces_of_a_run_to_a_millionth(tmp_path, compiler, monkeypatch, pump):
     """An excavator with a pump that is too small for its path, in FMPy's master with the inputs that ours gave.
 
     FMPy gives all inputs one step later, and zeros in the first, in which the machine stands with its valves shut and
@@ -81,7 +83,7 @@ def test_a_second_master_gives_the_traces_of_a_run_to_a_millionth(tmp_path, comp
 
     folder, banks, kept = write_excavator(tmp_path / "excavator"), drive.banks, []
     with (folder / "robot.toml").open("a", encoding="utf-8") as file:
-        file.write(PUMP)
+        file.write(pump)
     monkeypatch.setattr(drive, "banks", lambda *a, **k: kept.append(Recording(banks(*a, **k))) or kept[-1])
     robot = load_robot_model(str(folder))
     chain, way = ClosedChain(robot), np.array([0.4, 0.8, -0.4])
