@@ -156,8 +156,10 @@ def test_a_straight_push_in_another_direction_is_the_one_down_turned():
 def test_where_all_rest_without_pressing_nothing_stops_the_part_and_the_end_is_their_mean():
     seat, height = end_of(resting(0.0, 1.0), resting(0.0004, 1.0))
     assert height == pytest.approx(0.2, abs=0.05) and seat["stop_m"] > 0.0
-    assert end_of(resting(0.0, 0.0, 3.1))[0]["stop_m"] > 0.0  # who leant on a post that goes through (AutoMate 00486)
-    assert end_of(resting(0.0, 0.0, 4.2))[0]["stop_m"] == 0.0  # the lightest press on a bottom (00700)
+    leant = (resting(0.0, 0.0, 5.1), resting(0.0, 0.0, 0.3))  # one on a post that goes through (AutoMate 00486)
+    assert end_of(*leant)[0]["stop_m"] > 0.0 and end_of(resting(0.0, 0.0, 4.0))[0]["stop_m"] > 0.0
+    pressed = resting(0.0, 0.0, 9.7)  # the lightest press on a bottom (00117)
+    assert end_of(pressed)[0]["stop_m"] == 0.0 and end_of(pressed, resting(0.0, 0.0, 3.0))[0]["stop_m"] == 0.0
     assert any(line.startswith("stop:") for line in describe(learned_of(resting(0.0, 1.0))))
     assert not any(line.startswith("stop:") for line in describe(learned_of(resting(0.0, 10.0))))
 
