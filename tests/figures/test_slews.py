@@ -77,7 +77,7 @@ def teach(robot, scene):
 
 @pytest.fixture(scope="module")
 def taught(tmp_path_factory):
-    scene = load_world("pallets", {"side_stop": True, "tolerance": 0.02})
+    scene = load_world("pallets", {"aside": 0.3, "tolerance": 0.02})
     return scene, teach(turned(tmp_path_factory.mktemp("taught") / "excavator", TAUGHT), scene)
 
 

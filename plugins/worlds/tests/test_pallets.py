@@ -51,7 +51,7 @@ def test_a_given_stiffness_replaces_the_surfaces_own(plant):
 
 def test_a_second_stop_yields_across_and_closes_the_corner(plant, scene):
     """Pushed along the diagonal by 2 kN an axis without friction, the tool deflects each surface by 2 mm."""
-    params = {"side_stop": True, "friction": 0.0, "above": 0.01, "away": 0.01, "aside": 0.01}
+    params = {"friction": 0.0, "above": 0.01, "away": 0.01, "aside": 0.01}
     now = plant("free_tool", "pallets", **params)
     push(now, 2000.0 * np.array([1.0, 1.0, -1.0]), 1500)
     names = ("stop", "side_stop", "stack")
@@ -65,7 +65,7 @@ def test_a_second_stop_yields_across_and_closes_the_corner(plant, scene):
 @pytest.mark.parametrize("room", [{"away": 0.01}, {"above": 0.01}, {"aside": 0.01}])
 def test_no_demonstration_begins_behind_a_surface(scene, room):
     """However near to it the tool's nominal start is."""
-    where = scene("pallets", side_stop=True, **room)
+    where = scene("pallets", **{"aside": 0.3, **room})
     for start in where.task.starts:
         offset = np.array([start.get(f"start.offset_{axis}", 0.0) for axis in "xyz"])
         left = (np.array(where.reached[0]) - where.start_tip - offset) * [1.0, 1.0, -1.0]

@@ -39,12 +39,12 @@ class PalletsParams:
         pallets: number in the stack; its top is 0.144 m higher with each, styrofoam included [1 to 6].
         length: of the stack, from the stop towards the machine [m, 0.3m to 1.2m]; the arm of a loader
             needs a short one.
-        side_stop: a second stop, to the left of the tool: a corner of three surfaces.
         plate_mass: mass that moves with each surface [kg, 10kg to 200kg].
         damping_ratio: of that mass on its spring [0.1 to 2].
         above: nominal height of the tool over the stack [m, 1mm to 0.8m].
         away: nominal distance of the tool from the stop [m, 1mm to 0.8m].
-        aside: nominal distance of the tool from the second stop [m, 1mm to 0.6m].
+        aside: nominal distance of the tool from a second stop, to its left, for a corner of three surfaces; 0 for
+            none [m, 0 to 0.6m].
         tolerance: distance from the undeflected corner that counts as reached [m, 10um to 100mm]. In styrofoam the tool
             may also be deeper, by less than the sheets' thickness.
     """
@@ -54,12 +54,11 @@ class PalletsParams:
     friction: float = 0.3
     pallets: int = 3
     length: float = 1.2
-    side_stop: bool = False
     plate_mass: float = 40.0
     damping_ratio: float = 0.5
     above: float = 0.35
     away: float = 0.45
-    aside: float = 0.3
+    aside: float = 0.0
     tolerance: float = 0.01
 
 
@@ -77,7 +76,7 @@ def build(params: PalletsParams) -> Scene:
     )  # fmt: skip
     top, face = params.pallets * STEP, 0.5 + RADIUS
     corner = np.array([face - RADIUS, 0.0, top + RADIUS])
-    into = np.array([1.0, 1.0, -1.0]) if params.side_stop else np.array([1.0, 0.0, -1.0])  # the surfaces' directions
+    into = np.array([1.0, 1.0, -1.0]) if params.aside else np.array([1.0, 0.0, -1.0])  # the surfaces' directions
     across = np.flatnonzero(into)
 
     def distance(state: State) -> Float:
@@ -105,7 +104,7 @@ def build(params: PalletsParams) -> Scene:
         sprung("stack", (0.0, 0.0, 1.0), _top(params, top, face)),
         sprung("stop", (1.0, 0.0, 0.0), _face(params, top, face)),
     ]
-    if params.side_stop:
+    if params.aside:
         plates.append(sprung("side_stop", (0.0, 1.0, 0.0), _side(params, top, face)))
         wall, starts = [], [start | {"start.offset_y": -y} for start in starts]
         starts.append({"start.offset_y": y, "start.offset_z": z})
@@ -119,7 +118,7 @@ def build(params: PalletsParams) -> Scene:
         ),
         friction=params.friction,
         start_tip=(
-            float(corner[0]) - params.away, -params.aside if params.side_stop else 0.0, float(corner[2]) + params.above,
+            float(corner[0]) - params.away, 0.0 - params.aside, float(corner[2]) + params.above,
         ),
         start_quaternion=TOOL_DOWN,
         goal=sunk_in if params.surface == "styrofoam" else there,
@@ -133,13 +132,13 @@ def build(params: PalletsParams) -> Scene:
 
 def _across(params: PalletsParams) -> float:
     """Where the stack has its middle, across [m]: below the tool, or with its edge at the second stop."""
-    return RADIUS - 0.5 * WIDTH if params.side_stop else 0.0
+    return RADIUS - 0.5 * WIDTH if params.aside else 0.0
 
 
 def _top(params: PalletsParams, top: float, face: float) -> tuple[Geom, ...]:
     """The plate under the tool, which overlaps the stops so that nothing slips between."""
     low, high, across = face - params.length - PLATE, face + PLATE, _across(params)
-    wide = 0.5 * WIDTH + (PLATE if params.side_stop else 0.0)
+    wide = 0.5 * WIDTH + (PLATE if params.aside else 0.0)
     solid = Geom(
         kind="box", size=(0.5 * (high - low), wide, PLATE), position=(0.5 * (low + high), across, top - PLATE),
         visible=False,
@@ -156,7 +155,7 @@ def _top(params: PalletsParams, top: float, face: float) -> tuple[Geom, ...]:
 
 def _face(params: PalletsParams, top: float, face: float) -> tuple[Geom, ...]:
     """The stop's plate, which reaches as deep below the stack's top as styrofoam yields."""
-    half, across = (0.5 * WIDTH + PLATE if params.side_stop else 0.5 * POST), _across(params)
+    half, across = (0.5 * WIDTH + PLATE if params.aside else 0.5 * POST), _across(params)
     low, high = top - SHEETS - PLATE, top + ABOVE_STOP
     size = (PLATE, half, 0.5 * (high - low))
     solid = Geom(kind="box", size=size, position=(face + PLATE, across, 0.5 * (low + high)), visible=False)

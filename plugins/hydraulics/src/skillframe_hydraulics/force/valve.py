@@ -42,7 +42,7 @@ class ValveSettings:
         squeezed: largest share of the piston's rate that compresses oil.
         share: prior standard deviation of alpha; overlap: of beta; supply: of p_S [Pa].
         alike: number of rows that are correlated by the filters.
-        noise: prior root mean square residual of (1), share of the travel, which counts as two uncorrelated rows: a few
+        noise: prior root mean square residual of (1), share of the travel, which counts as one uncorrelated row: a few
             rows lie on a line by chance.
         largest: bound on b; reach: bound on p_S, +- of the nominal one.
         oil: standard deviation of the bulk modulus, relative.
@@ -59,7 +59,7 @@ class ValveSettings:
     overlap: float = 0.02
     supply: float = 3e6
     alike: float = 3.0
-    noise: float = 0.01
+    noise: float = 0.005
     largest: float = 0.2
     reach: float = 0.5
     oil: float = 0.2
@@ -168,9 +168,8 @@ class ValveIdentification:
         n, su, sy, suu, suy, syy = self._sums[:6]
         rows = np.maximum(n, 1.0)
         spread, along = np.maximum(suu - su * su / rows, 1e-12), suy - su * sy / rows
-        doubted = 2.0 * s.alike
-        residual = np.maximum(syy - sy * sy / rows - along * along / spread, 0.0) + doubted * s.noise**2
-        left: Float = residual / (rows + doubted)
+        residual = np.maximum(syy - sy * sy / rows - along * along / spread, 0.0) + s.alike * s.noise**2
+        left: Float = residual / (rows + s.alike)
         left = np.where(n > s.alike, left, 1e30)  # mean square error of the line (lags, N, k)
         best = np.argmin(left, axis=0)[None]
         chosen = (np.take_along_axis(v, best, axis=0)[0] for v in (*self._sums[:5], *self._sums[6:], left))
