@@ -159,7 +159,7 @@ def _face(params: PalletsParams, top: float, face: float) -> tuple[Geom, ...]:
     low, high = top - SHEETS - PLATE, top + ABOVE_STOP
     size = (PLATE, half, 0.5 * (high - low))
     solid = Geom(kind="box", size=size, position=(face + PLATE, across, 0.5 * (low + high)), visible=False)
-    thick, colour = _cover(params.surface), FOAM if params.surface == "styrofoam" else WOOD
+    thick, colour = _cover(params.surface), _colour(params)
     seen = (thick, min(half, 0.5 * WIDTH), 0.5 * ABOVE_STOP)
     return (solid, _drawn(seen, (face + thick, across, top + seen[2]), colour))
 
@@ -169,9 +169,15 @@ def _side(params: PalletsParams, top: float, face: float) -> tuple[Geom, ...]:
     low, high, half = top - SHEETS - PLATE, top + ABOVE_STOP, 0.5 * params.length
     size, middle = (half + PLATE, PLATE, 0.5 * (high - low)), face - half
     solid = Geom(kind="box", size=size, position=(middle, RADIUS + PLATE, 0.5 * (low + high)), visible=False)
-    thick, colour = _cover(params.surface), FOAM if params.surface == "styrofoam" else WOOD
+    thick, colour = _cover(params.surface), _colour(params)
     seen = (half, thick, 0.5 * ABOVE_STOP)
     return (solid, _drawn(seen, (middle, RADIUS + thick, top + seen[2]), colour))
+
+
+def _colour(params: PalletsParams) -> tuple[float, float, float, float]:
+    """Of the stops, translucent where they are wide and would hide the tool."""
+    colour = FOAM if params.surface == "styrofoam" else WOOD
+    return (*colour[:3], 0.3) if params.aside else colour
 
 
 def _drawn(size: Vector, position: Vector, colour: tuple[float, float, float, float]) -> Geom:
